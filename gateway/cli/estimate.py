@@ -23,6 +23,7 @@ from gateway.errors import NothingWeighedError
 from gateway.estimates.as_json import COLUMNS, estimate_to_json, table_row
 from gateway.estimates.batch_estimate import Estimate
 from gateway.estimates.field_kinds import without_dates
+from gateway.estimates.quantity import half_width
 from gateway.estimates.reasons import EXPLANATIONS
 from gateway.offline.estimates import estimates_of_logs
 from gateway.records import Why, json_line
@@ -193,7 +194,7 @@ def _told(record: Mapping[str, Any], name: str, unit: str, form: str, half_form:
     words, number = name.replace("_", " "), record[f"{name}_{unit}"]
     if number is None:
         return f"{words} unknown"
-    half = _half_width(record[f"{name}_interval95_{unit}"])
+    half = half_width(record[f"{name}_interval95_{unit}"])
     return f"{words} {number:{form}} {'%' if unit == 'pct' else unit} ± {half:{half_form}} (95 %)"
 
 
@@ -201,15 +202,10 @@ def _aside(record: Mapping[str, Any]) -> str:
     """The lateral position of the sprung mass, if known."""
     if record["cg_left_m"] is None:
         return ""
-    half_mm = 1000.0 * _half_width(record["cg_left_interval95_m"])
+    half_mm = 1000.0 * half_width(record["cg_left_interval95_m"])
     return f"{1000.0 * record['cg_left_m']:+5.0f} mm left ± {half_mm:3.0f} (95 %)   "
 
 
 def _too_much(record: Mapping[str, Any]) -> str:
     over = [place.replace("_", " ") for place, weight in record["weights"].items() if weight["is_over_limit"]]
     return f"   over the limit: {', '.join(over)}" if over else ""
-
-
-def _half_width(interval95: Sequence[float]) -> float:
-    """Half the width of the interval: the number after ±."""
-    return (interval95[1] - interval95[0]) / 2.0

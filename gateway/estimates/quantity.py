@@ -1,11 +1,17 @@
 """A number with its standard deviation and its 95 % interval."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 Z95: Final = 1.959964  # standard deviations to either side of a normal distribution's middle 95 %
 UNKNOWN_INTERVAL: Final = (math.nan, math.nan)
+
+
+def half_width(interval95: Sequence[float]) -> float:
+    """Half the width of a 95 % interval (low, high), the number after ±; NaN if it is unknown."""
+    return (interval95[1] - interval95[0]) / 2.0
 
 
 @dataclass(frozen=True, slots=True)

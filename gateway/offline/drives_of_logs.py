@@ -66,9 +66,10 @@ def read_drives(
             continue
         facts = facts_of_log(log, motion, motion, report, signal_map)
         found = windows_of_motion(motion, signal_map, settings)
-        teaching = [one for one in found if can_teach(one.batch, settings)]
-        if (same := next((one for one in windows if _is_driven_in(one.batch, teaching)), None)) is not None:
-            drives.repeated[log] = source[same.batch.drive_start_ns]
+        teaching = [one.batch for one in found if can_teach(one.batch, settings)]
+        repeated = (one.batch for one in windows if any(_is_same_driving(one.batch, other) for other in teaching))
+        if (same := next(repeated, None)) is not None:
+            drives.repeated[log] = source[same.drive_start_ns]
             continue
         findings = _findings(motion, found, facts, signal_map, vehicle, settings)
         kept = drives.faulty if any(one.severity is Severity.FAULT for one in findings) else drives.findings
@@ -83,17 +84,15 @@ def read_drives(
     return replace(drives, pieces=found_pieces)
 
 
-def _is_driven_in(earlier: Batch, windows: Sequence[KeptBatch]) -> bool:
-    """Whether one of these is of the same driving: a log named twice, its packed copy, a second recorder.
+def _is_same_driving(one: Batch, other: Batch) -> bool:
+    """Whether two windows are of the same driving: a log named twice, its packed copy, a second recorder.
 
     Of times without a date only the same begin tells it: other drives begin at 0 too, but would be joined with this.
     """
-    for one in windows:
-        begin_ns, end_ns = max(earlier.t_start_ns, one.batch.t_start_ns), min(earlier.t_end_ns, one.batch.t_end_ns)
-        is_dated = begin_ns >= FIRST_DATED_NS
-        if end_ns - begin_ns > NS_PER_S if is_dated else earlier.t_start_ns == one.batch.t_start_ns:
-            return True
-    return False
+    begin_ns, end_ns = max(one.t_start_ns, other.t_start_ns), min(one.t_end_ns, other.t_end_ns)
+    if begin_ns < FIRST_DATED_NS:
+        return one.t_start_ns == other.t_start_ns
+    return end_ns - begin_ns > NS_PER_S
 
 
 def windows_of_motion(motion: Motion, signal_map: SignalMap, settings: BatchSettings) -> list[KeptBatch]:

@@ -14,5 +14,5 @@ def never(*_: Any) -> str:
 
 
 if __name__ == "__main__":
-    Learnt.state = never  # type: ignore[method-assign]  # a fault, put in
+    Learnt.state = never  # type: ignore[method-assign]  # the fault: it never answers
     main()

@@ -5,11 +5,13 @@ from pathlib import Path
 
 import pytest
 from support.drives import drive
-from support.learner import NOW_NS, WINDOW_S, LearnerBench, kept_window, window
+from support.learner import ANSWERS, NOW_NS, WINDOW_S, LearnerBench, kept_window, window
 
 from gateway.calibration.kept import packed, unpacked
+from gateway.calibration.learning.job import LearnJob
 from gateway.service.learner.kept_drives import DriveFiles
 from gateway.service.learner.learner import MOST_WAITING
+from gateway.stated.facts import VehicleAnswers
 from gateway.units import NS_PER_S
 
 BYTES = len(packed(kept_window(0, 0)))
@@ -80,3 +82,17 @@ def test_windows_that_nobody_can_keep_are_counted_and_told(tmp_path: Path) -> No
     told = json.loads(learner.learnt.state())
     assert told["n_windows_lost"] == n_handed - MOST_WAITING
     assert "wait for the disk" in told["fault"]
+
+
+def test_a_fit_that_cannot_begin_loses_no_window(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(job: LearnJob) -> None:
+        raise OSError("no space left")
+
+    bench = LearnerBench(tmp_path)
+    bench.learner.van.state(VehicleAnswers(**ANSWERS), "workshop", is_confirmed=True)
+    bench.drive(0)
+    monkeypatch.setattr(bench.worker, "start", refuse)
+    bench.turn()
+    told = json.loads(bench.learner.learnt.state())
+    assert "nothing can be learnt: no space left" in told["fault"]
+    assert told["n_windows_lost"] == 0

@@ -8,9 +8,9 @@ from enum import StrEnum
 from typing import Any, Final
 
 from gateway.estimates.batch_estimate import PLACES
-from gateway.estimates.quantity import UNKNOWN_INTERVAL
+from gateway.estimates.quantity import UNKNOWN_INTERVAL, half_width
 from gateway.estimates.reasons import EXPLANATIONS
-from gateway.records import iso_utc, ns_of
+from gateway.records import iso_utc, ns_of, rounded
 
 ENTRY_KIND: Final = "alarm"
 """The kind of an alarm's row in the store and in the event stream."""
@@ -109,11 +109,11 @@ def alarm_to_json(alarm: Alarm) -> dict[str, Any]:
         "t_start": iso_utc(alarm.t_start_ns),
         "t_end": None if alarm.t_end_ns is None else iso_utc(alarm.t_end_ns),
         "sentence": sentence(alarm),
-        "probability": _known(figure.probability, 4),
-        "found_kg": _known(figure.found_kg, 1),
-        "std_kg": _known(figure.std_kg, 1),
+        "probability": rounded(figure.probability, 4),
+        "found_kg": rounded(figure.found_kg, 1),
+        "std_kg": rounded(figure.std_kg, 1),
         "interval95_kg": None if math.isnan(figure.interval95_kg[0]) else [round(x, 1) for x in figure.interval95_kg],
-        "limit_kg": _known(figure.limit_kg, 1),
+        "limit_kg": rounded(figure.limit_kg, 1),
         "detail": figure.detail,
     }
 
@@ -132,10 +132,6 @@ def alarm_from_json(told: Mapping[str, Any]) -> Alarm:
     )
 
 
-def _known(x: float, digits: int) -> float | None:
-    return round(x, digits) + 0.0 if math.isfinite(x) else None
-
-
 _HAPPENED: Final[Mapping[str, str]] = {why: told.happened.replace("`", "") for why, told in EXPLANATIONS.items()}
 _PLACES: Final = {"gross": "The vehicle", "front_axle": "The front axle", "rear_axle": "The rear axle"}
 
@@ -146,8 +142,8 @@ def sentence(alarm: Alarm) -> str:
     if alarm.cause.kind is AlarmKind.OVERLOAD:
         where = alarm.cause.where
         subject = _PLACES.get(where, f"The wheel at the {where.replace('_', ' ')}")
-        low_kg, high_kg = figure.interval95_kg
-        take = "" if math.isnan(low_kg) else f" +- {(high_kg - low_kg) / 2.0:.0f}"
+        half_kg = half_width(figure.interval95_kg)
+        take = "" if math.isnan(half_kg) else f" +- {half_kg:.0f}"
         said = f"{subject} weighs {figure.found_kg:.0f}{take} kg, limit {figure.limit_kg:.0f} kg"
     elif alarm.cause == SILENT:
         said = f"No signal: {detail}" if detail else "No signal"

@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Any, Final
 
 from gateway.core.change import Rules, change_of
-from gateway.core.events.entry import Entry, EntryKind, entry_id, quantity_json, rounded
+from gateway.core.events.entry import Entry, EntryKind, entry_id, quantity_json
 from gateway.core.loads import (
     SLACK_NS,
     FusedLoad,
@@ -33,7 +33,7 @@ from gateway.core.loads import (
 from gateway.estimates.batch_estimate import NOWHERE, Estimate, Quantity, Way
 from gateway.estimates.field_kinds import PLACE
 from gateway.estimates.posterior import CG_LEFT, FRONT_SHARE, PAYLOAD
-from gateway.records import iso_utc
+from gateway.records import iso_utc, rounded
 from gateway.units import NS_PER_S
 
 

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from gateway.estimates.batch_estimate import Quantity
+from gateway.records import rounded
 
 NEWS_STD_SHARE: Final = 0.25  # chosen: of its standard deviation; a smaller change is not reported
 NEWS_PROBABILITY: Final = 0.05  # chosen: a smaller change of a probability is not reported
@@ -65,11 +66,6 @@ def quantity_json(quantity: Quantity, name: str, unit: str, digits: int) -> dict
         f"{name}_std_{unit}": rounded(quantity.std, digits),
         f"{name}_interval95_{unit}": interval,
     }
-
-
-def rounded(x: float, digits: int) -> float | None:
-    """Rounded, never -0.0; None where unknown."""
-    return round(x, digits) + 0.0 if math.isfinite(x) else None
 
 
 def _differs(before: Any, after: Any) -> bool:

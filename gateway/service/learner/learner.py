@@ -150,7 +150,11 @@ class Learner(ThreadPart):
         return vehicle is not None and bool(assign(self._book.record.records, pieces, vehicle).holding[0])
 
     def _lose(self, why: str) -> None:
+        """A window is lost."""
         self.n_lost += 1
+        self._fail(why)
+
+    def _fail(self, why: str) -> None:
         if self._disk_fault is None:  # log it once until it works again
             log_event(Event.DRIVE_NOT_KEPT, level=logging.WARNING, fault=why)
         self._disk_fault = f"drives cannot be kept to learn from: {why}; weighing goes on"
@@ -182,7 +186,7 @@ class Learner(ThreadPart):
             try:
                 self._worker.start(job)
             except OSError as refusal:
-                self._lose(f"nothing can be learnt: {refusal}")
+                self._fail(f"nothing can be learnt: {refusal}")
 
     def _job(self) -> LearnJob | None:
         """What there is to learn from; None if that is nothing yet."""
@@ -248,7 +252,7 @@ class Learner(ThreadPart):
             try:
                 self._take_result(job, result)
             except (OSError, RefusedError, CalibrationFileError) as refusal:
-                self._lose(f"what was learnt cannot be stored: {refusal}")
+                self._fail(f"what was learnt cannot be stored: {refusal}")
 
     def _take_result(self, job: LearnJob, result: LearnResult) -> None:
         record = self._book.record

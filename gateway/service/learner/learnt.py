@@ -11,7 +11,7 @@ from gateway.errors import RefusedError
 from gateway.log import Event
 from gateway.records import iso_utc, ns_of, rounded
 from gateway.service.learner.kept_drives import DriveFiles, Window
-from gateway.service.learner.learning_file import MOST_LADEN, Book, Laden, LearningRecord, LearntVersion
+from gateway.service.learner.learning_file import MOST_LADEN, Book, Laden, LearntVersion
 from gateway.service.learner.said import StatedLoads
 from gateway.service.learner.van import StatedVan
 from gateway.service.learner.worker import Worker
@@ -40,14 +40,17 @@ class Learnt:
         """``fault`` says what keeps the learner from learning, ``n_lost`` how many windows it could not keep."""
         self._book, self._files, self._van, self._loads = book, files, van, loads
         self._scheduler, self._worker, self._fault, self._n_lost = drives, worker, fault, n_lost
-        active = book.record.active
-        self._started_with = active.id if active else None
+        self._started_with = self._active_id
+
+    @property
+    def _active_id(self) -> str | None:
+        active = self._book.record.active
+        return active.id if active else None
 
     @property
     def is_due(self) -> bool:
         """Whether another calibration than at the start waits for the next drive."""
-        active = self._book.record.active
-        return (active.id if active else None) != self._started_with
+        return self._active_id != self._started_with
 
     def state(self) -> str:
         """JSON: a LearningState."""
@@ -78,7 +81,7 @@ class Learnt:
             n_windows_lost=self._n_lost(),
             statements={name: counts.get(name, 0) for name in STATES},
             questions=list(self._questions(told, last)),
-            versions=[self._version_told(one, record) for one in reversed(record.versions)],
+            versions=[self._version_told(one) for one in reversed(record.versions)],
             held_version=record.held,
             fault=self._fault(),
         )
@@ -116,7 +119,7 @@ class Learnt:
         yield Question(kind="looks_empty", text=f"{which} empty{listed}. Is that right?", propose=propose)
 
     def _looking_empty(self, last: LearnResult | None) -> list[dict[str, Any]]:
-        """The drives that look empty, without those of which somebody said that they were not."""
+        """The drives that look empty, unless somebody said that they carried a load."""
         laden = [one.span for one in self._book.record.laden]
         found = [one for one in last.drives if one["number"] in last.looks_empty] if last else []
         return [one for one in found if not any(Piece(*_span_of(one), one["number"]).meets(*span) for span in laden)]
@@ -137,11 +140,9 @@ class Learnt:
             self._book.tell(Event.NOT_EMPTY, {"n": len(said), "by": by})
             return self._state().model_dump_json(by_alias=True)
 
-    def _version_told(self, one: LearntVersion, record: LearningRecord) -> VersionTold:
-        active = record.active
-        is_active = active is not None and active.id == one.id
+    def _version_told(self, one: LearntVersion) -> VersionTold:
         state = "earlier"
-        if is_active:
+        if one.id == self._active_id:
             state = "in_use" if one.id == self._started_with else "next_drive"
         elif one.worse is not None:
             state = "worse"

@@ -15,6 +15,7 @@ from gateway.core.vehicle import Vehicle
 from gateway.core.weights.limits import Room, rooms_of
 from gateway.core.weights.room import Halves, room_of
 from gateway.estimates.batch_estimate import Estimate, Lack, Quantity, Weights
+from gateway.estimates.quantity import half_width
 from gateway.records import iso_utc, rounded
 from gateway.status import OwnReading, State, Status
 from gateway.store import StoreReader
@@ -160,10 +161,9 @@ def _room(weights: Weights, vehicle: Vehicle | None) -> RoomTold | None:
     room = None if vehicle is None else room_of(weights, vehicle)
     if room is None:
         return None
-    low_kg, high_kg = room.most.interval95
     return RoomTold(
         kg=round(room.most.number, 1),
-        plus_minus_kg=round((high_kg - low_kg) / 2.0, 1),
+        plus_minus_kg=round(half_width(room.most.interval95), 1),
         safe=_halves(room.safe),
         is_anywhere=room.is_anywhere,
         take_out=None if room.take_out is None else _halves(room.take_out),

@@ -12,6 +12,7 @@ from gateway.core.weights.limits import Light
 from gateway.core.weights.on_the_road import NOT_CALIBRATED, PayloadPlace, place_of, weighed
 from gateway.core.weights.verdict import Says, Verdict, verdict_of
 from gateway.estimates.batch_estimate import Estimate, Weights
+from gateway.estimates.quantity import half_width
 from gateway.estimates.reasons import EXPLANATIONS, Cause
 from gateway.records import Why, rounded
 from gateway.status import Status
@@ -107,8 +108,7 @@ class Scales:
         """Whether the payload's 95 % interval is wider than one that is of use."""
         if load is None or self.vehicle is None:
             return False
-        low_kg, high_kg = load.payload.interval95
-        return (high_kg - low_kg) / 2.0 > self.vehicle.useful_half_width_kg
+        return half_width(load.payload.interval95) > self.vehicle.useful_half_width_kg
 
 
 def _rejected(heard: Estimate | None, shown: Estimate | None, now: Status) -> tuple[Why, ...]:
