@@ -287,6 +287,11 @@ def iso_utc(t_ns: int) -> str:
     return f"{stamp:%Y-%m-%dT%H:%M:%S}.{whole_us % 1_000_000:06d}Z"
 
 
+def date_of(t_ns: int) -> str | None:
+    """As :func:`iso_utc`; None before 1986, for such a stamp counts from something else."""
+    return iso_utc(t_ns) if t_ns >= FIRST_DATED_NS else None
+
+
 def ns_of(text: str) -> int:
     """The inverse of :func:`iso_utc`, to the microsecond."""
     return (datetime.fromisoformat(text) - _START) // timedelta(microseconds=1) * 1000

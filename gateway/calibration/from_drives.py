@@ -24,7 +24,7 @@ from gateway.core.vehicle import Load, Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.estimates.quantity import Z95
 from gateway.model.vehicle_model import VehicleModel
-from gateway.records import F64, iso_utc
+from gateway.records import F64, date_of
 from gateway.stated.doubt import Doubt
 
 OnFit = Callable[[str, int, int], None]  # (estimator, steps done, steps in all)
@@ -239,8 +239,8 @@ def _provenance(
                 number=run.number,
                 log=run.log,
                 sha256=one.log.sha256,
-                t_start=iso_utc(span_ns[0]) if span_ns else None,
-                t_end=iso_utc(span_ns[1]) if span_ns else None,
+                t_start=date_of(span_ns[0]) if span_ns else None,
+                t_end=date_of(span_ns[1]) if span_ns else None,
                 n_batches=sum(not batch.rejected for batch in run.batches),
                 statement=run.statement,
                 found=_found_part(found) if found else None,

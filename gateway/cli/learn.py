@@ -1,6 +1,7 @@
 """springscale learn: ordinary drives, and what is said of their loads, to a calibration file."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 from zoneinfo import ZoneInfo
@@ -22,6 +23,7 @@ from gateway.cli.calibrate import require_places, tell_doubts, written_and_judge
 from gateway.cli.options import FILE, ZONE, as_json, batch_settings, window
 from gateway.cli.progress import counted, on_share
 from gateway.errors import ConfigurationError
+from gateway.estimates.field_kinds import without_dates
 from gateway.offline.drives_of_logs import Drives, read_drives
 from gateway.records import json_line, rounded
 from gateway.stated.statement import StatementRecord
@@ -92,7 +94,7 @@ def learn(
             on_fit=on_share(on_step, ("cross_spectrum",)),
         )
     verdict = written_and_judged(found.outcome, output, report)
-    record |= {"drives": drives_record(found), "n_drives_unneeded": found.n_unneeded}
+    record |= {"drives": without_dates(drives_record(found)), "n_drives_unneeded": found.n_unneeded}
     of_rows = [{"row": numbers[one["id"]], **one} for one in statements_record(records, assigned, found)]
     record |= {"statements": sorted(of_rows, key=lambda one: one["row"]), "looks_empty": list(found.looking_empty())}
     record |= _verdict_record(found, verdict, output)
@@ -133,6 +135,7 @@ def _logs_record(drives: Drives) -> Record:
         "n_short_drives": drives.pieces.n_short,
         "short_s": rounded(drives.pieces.short_s, 1),
         "left_out": {str(log): why for log, why in left_out.items()},
+        "dates": {str(log): list(remarks) for log, remarks in drives.dates.items()},
         "findings": {
             str(log): [f"{one.severity} {one.kind}: {one.text}: {one.advice}" for one in found]
             for log, found in drives.findings.items()
@@ -170,13 +173,13 @@ def _logs_told(record: Record) -> Iterator[str]:
     yield f"{n_of(record['n_logs'], 'log')}: {n_of(record['n_drives'], 'drive')} with {hours:.1f} h of driving{lost}"
     for log, reasons in left_out.items():
         yield from (f"  {log}: left out: {why}" for why in reasons)
-    of_finding: dict[str, list[str]] = {}
-    for log, findings in record["findings"].items():
-        for one in findings:
-            of_finding.setdefault(one, []).append(log)
-    for finding, logs in of_finding.items():
+    logs_of: dict[str, list[str]] = {}
+    for log, texts in chain(record["dates"].items(), record["findings"].items()):
+        for text in texts:
+            logs_of.setdefault(text, []).append(log)
+    for text, logs in logs_of.items():
         others = f" and {n_of(len(logs) - 1, 'other log')}" if len(logs) > 1 else ""
-        yield f"  {logs[0]}{others}: {finding}"
+        yield f"  {logs[0]}{others}: {text}"
     if n := record["n_short_drives"]:
         what = one_or_more(n, "drive", "drives")
         yield f"  {what} without a minute of steady driving ({record['short_s']:.0f} s in all) can teach nothing"
@@ -199,8 +202,8 @@ def _drives_told(record: Record) -> Iterator[str]:
         found = one["found_without_statement"] or one["found"]
         shown = _kg_told(found) if found else "too little driving"
         stated = _kg_told(one["stated"]) if one["stated"] else "nothing"
-        begun = one["t_start"][:16].replace("T", " ")
-        line = f"{one['number']:>5}  {name:28}  {begun}  {stated:>17}  {shown:>17}  {one['state'] or ''}"
+        begun = one["t_start"][:16].replace("T", " ") if one["t_start"] else "no date"
+        line = f"{one['number']:>5}  {name:28}  {begun:16}  {stated:>17}  {shown:>17}  {one['state'] or ''}"
         yield line.rstrip()
     if n := record["n_drives_unneeded"]:
         yield f"{n_of(n, 'drive')} of unknown load were not used: those above teach as much"
@@ -229,8 +232,10 @@ def _asked(record: Record) -> Iterator[str]:
         drives = [record["drives"][number - 1] for number in numbers]
         named = f"drive{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))}"
         looks = "looks" if len(numbers) == 1 else "look"
-        yield f"{named} of unknown load {looks} empty. Is that right? Then add to the statements:"
-        yield "    from;until;source"
-        yield from (f"    {one['t_start'][:19]}Z;{one['t_end'][:19]}Z;empty" for one in drives)
+        dated = [one for one in drives if one["t_start"]]
+        asked = "Is that right? Then add to the statements:" if dated else "A statement wants a log with dates."
+        yield f"{named} of unknown load {looks} empty. {asked}"
+        yield from ["    from;until;source"] * bool(dated)
+        yield from (f"    {one['t_start'][:19]}Z;{one['t_end'][:19]}Z;empty" for one in dated)
     yield f"{record['output'] or 'no file written'}: id {record['calibration_id']}"
     yield from (f"warning: {one}" for one in record["warnings"] if ": load" not in one)

@@ -35,6 +35,7 @@ class Drives:
     pieces: Pieces
     n_logs: int
     unreadable: dict[Path, str] = field(default_factory=dict)
+    dates: dict[Path, tuple[str, ...]] = field(default_factory=dict)  # what is not known of them
     repeated: dict[Path, Path] = field(default_factory=dict)
     faulty: dict[Path, tuple[Finding, ...]] = field(default_factory=dict)
     findings: dict[Path, tuple[Finding, ...]] = field(default_factory=dict)
@@ -64,6 +65,8 @@ def read_drives(
         except LogUnreadableError as fault:
             drives.unreadable[log] = str(fault)
             continue
+        if remarks := tuple(report.remarks_on_dates()):
+            drives.dates[log] = remarks
         facts = facts_of_log(log, motion, motion, report, signal_map)
         found = windows_of_motion(motion, signal_map, settings)
         teaching = [one.batch for one in found if can_teach(one.batch, settings)]

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import can
 import pytest
 from support.commands import called, printed
 from support.known_load_logs import SIGNALS, write_known_loads
@@ -173,6 +174,26 @@ def test_drives_without_a_date_are_not_taken_for_one(drives: Path, tmp_path: Pat
     said = printed("learn", *logs, "--vehicle", drives / "van.toml", "--signals", SIGNALS, "--dry-run", *WINDOW)
     assert "2 logs: 1 drive with" in said
     assert f"{logs[1]}: left out: of the same time as {logs[0]}" in said
+    assert f"{logs[0]} and 1 other log: has no date" in said
+
+
+def test_a_drive_without_a_date_has_none_anywhere(drives: Path, tmp_path: Path) -> None:
+    log, output = tmp_path / "01.log", tmp_path / "vehicle.json"
+    log.write_bytes(_undated((drives / log.name).read_bytes()))
+    options = ("--vehicle", drives / "van.toml", "--signals", SIGNALS, "--output", output, *WINDOW)
+    assert "  no date  " in printed("learn", log, *options)
+    assert load_calibration(output).provenance.drives[0].t_start is None
+    (told,) = json.loads(printed("learn", log, *options, "--json"))["drives"]
+    assert (told["t_start"], told["t_start_ns"]) == (None, 0)
+
+
+def test_the_zone_of_a_log_is_asked_for_where_statements_have_times(drives: Path, tmp_path: Path) -> None:
+    log = tmp_path / "01.asc"
+    with can.LogReader(drives / "01.log") as reader, can.ASCWriter(log) as writer:
+        for message in reader:
+            writer.on_message_received(message)
+    said = printed("learn", log, "--vehicle", drives / "van.toml", "--signals", SIGNALS, "--dry-run", *WINDOW)
+    assert f"{log}: its date states no zone, it is read as UTC" in said
 
 
 def test_without_a_place_for_the_calibration_nothing_begins(drives: Path) -> None:

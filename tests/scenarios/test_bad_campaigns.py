@@ -1,5 +1,6 @@
 """Campaigns gone wrong, from log files through the command line: each is told what is wrong and how to mend it."""
 
+import gzip
 import json
 import re
 from collections.abc import Sequence
@@ -169,6 +170,18 @@ def test_every_log_at_fault_is_named_and_the_rest_goes_on(folder: Path) -> None:
     assert told[4] == ["warning:log_damaged"]
     exit_code, found = check(altered(folder, "twice", (1, 9, 10), run9=runs["run9"]))
     assert (kinds(found)[1], kinds(found)[2]) == (["fault:same_drive"], ["fault:same_drive"])
+
+
+def test_a_log_whose_clock_was_set_is_named(folder: Path) -> None:
+    lines = gzip.decompress(next(folder.glob("04_*/can.log.gz")).read_bytes()).splitlines(keepends=True)
+    half = len(lines) // 2
+    later = [re.sub(rb"\((\d+)", lambda stamp: b"(%d" % (int(stamp[1]) - 40), line) for line in lines[half:]]
+    (folder / "set.log").write_bytes(b"".join([*lines[:half], *later]))
+    run4 = re.sub(r'log = ".*"', 'log = "set.log"', table_of(folder, 4))
+    _, found = check(altered(folder, "set", run4=run4))
+    assert "warning:log_clock" in kinds(found)[2]
+    assert "its stamps step back 1 time, by up to 0:00:39." in json.dumps(found)
+    assert all("log_clock" not in told for number, findings in kinds(found).items() if number != 2 for told in findings)
 
 
 def test_faults_that_leave_one_load_of_several_are_refused(folder: Path) -> None:

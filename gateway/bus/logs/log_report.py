@@ -225,34 +225,36 @@ class LogReport:
         for silent in self.decoder.silent() if self.decoder is not None and self.wanted else ():
             yield f"{self.path}: has no frame of {silent}"
         refused = () if self.decoder is None else self.decoder.remarks()
-        for note in (*self.notes, *(remark.text for remark in refused)):
-            yield f"{self.path}: {note}"
-        yield from self._remarks_on_time()
+        texts = (*self.notes, *(remark.text for remark in refused), *self.remarks_on_dates(), *self.remarks_on_clock())
+        yield from (f"{self.path}: {text}" for text in texts)
 
     def causes(self) -> tuple[Remark, ...]:
         """What the decoder refused so often that it explains why nothing is weighed."""
         return () if self.decoder is None else self.decoder.causes()
 
-    def _remarks_on_time(self) -> Iterator[str]:
+    def remarks_on_dates(self) -> Iterator[str]:
+        """What is not known of the dates of its frames."""
         if self.first_ns is None:
             return
         if not self.is_dated:
-            yield f"{self.path}: has no date: times count from the zero of its stamps"
+            yield "has no date: times count from the zero of its stamps"
         elif self.has_wall_clock and self.zone is None:
-            yield (
-                f"{self.path}: its date states no zone, it is read as UTC; if that is wrong, state time_zone in the "
-                "signal map"
-            )
+            yield "its date states no zone, it is read as UTC; if that is wrong, state time_zone in the signal map"
+
+    def remarks_on_clock(self) -> Iterator[str]:
+        """Where its stamps do not run as a clock does."""
+        if self.first_ns is None:
+            return
         back_s, leap_s = -self._steps_ns[0] / NS_PER_S, self._steps_ns[1] / NS_PER_S
         if back_s > STEP_BACK_S or 8 * self.out_of_order > self.wanted:
             times, what = counted(self.out_of_order, "time"), "is it several logs in one, or was the clock set?"
-            yield f"{self.path}: its stamps step back {times}, by up to {timedelta(seconds=back_s)}: {what}"
+            yield f"its stamps step back {times}, by up to {timedelta(seconds=back_s)}: {what}"
         if leap_s > LEAP_S:
-            yield f"{self.path}: its stamps leap forward by {timedelta(seconds=leap_s)}: a pause, or was the clock set?"
+            yield f"its stamps leap forward by {timedelta(seconds=leap_s)}: a pause, or was the clock set?"
         late_h = 0.0 if self.start_ns is None else (self.first_ns - self.start_ns) / NS_PER_S / 3600.0
         if late_h > LATE_START_H:
             late = f"{late_h:.1f} h after the date of its header, {iso_utc(self.start_ns or 0)}"
-            yield f"{self.path}: its first frame comes {late}: do its stamps count from another instant?"
+            yield f"its first frame comes {late}: do its stamps count from another instant?"
 
     def why_no_times(self) -> str | None:
         """Why the stamps of the wanted frames cannot be their times; None if they can."""

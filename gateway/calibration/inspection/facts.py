@@ -105,9 +105,9 @@ class LogFacts:
     """The result of reading a run's log.
 
     ``duration_s`` is of the whole log, ``span_ns`` the first and last stamp of the run's piece of it, None if that
-    piece is empty. ``unreadable`` says why nothing could be read, ``damage`` what was lost of it, ``silent`` why a
-    mapped signal has no valid sample. ``mismatches`` say which frames do not fit the signal map: a sentence, their
-    share of the message, and the signals that suffer.
+    piece is empty. ``unreadable`` says why nothing could be read, ``damage`` what was lost of it, ``clock`` where its
+    stamps do not run as a clock does, ``silent`` why a mapped signal has no valid sample. ``mismatches`` say which
+    frames do not fit the signal map: a sentence, their share of the message, and the signals that suffer.
     """
 
     sha256: str = ""
@@ -116,6 +116,7 @@ class LogFacts:
     span_ns: tuple[int, int] | None = (0, 0)
     unreadable: str | None = None
     damage: str | None = None
+    clock: tuple[str, ...] = ()
     silent: Mapping[Signal, str] = field(default_factory=dict)
     mismatches: tuple[tuple[str, float, frozenset[Signal]], ...] = ()
 

@@ -195,9 +195,10 @@ def _is_misread(stream: Stream, ratio: float) -> bool:
 
 
 def _of_map(seen: _Seen) -> Iterator[Finding]:
-    """Damage of the log, signals without a place in the map, and frames that do not fit it."""
+    """Damage of the log, its clock, signals without a place in the map, and frames that do not fit it."""
     if seen.drive.log.damage:
         yield Finding.of(Kind.LOG_DAMAGED, seen.drive.log.damage)
+    yield from (Finding.of(Kind.LOG_CLOCK, text) for text in seen.drive.log.clock)
     if seen.streams and Signal.SPEED not in seen.streams and Signal.WHEEL_SPEED not in seen.streams:
         yield Finding.of(Kind.SIGNAL_UNMAPPED, "neither speed nor wheel_speed is in the signal map")
     absent = [signal for signal in INERTIAL if signal not in seen.streams]
