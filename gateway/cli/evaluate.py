@@ -1,6 +1,7 @@
 """springscale evaluate: the error table of (12)."""
 
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import click
@@ -14,7 +15,7 @@ from gateway.cli.calibrate import report_written
 from gateway.cli.options import FILE, as_json, batch_settings, one_estimator, window
 from gateway.cli.progress import counted
 from gateway.errors import ConfigurationError
-from gateway.offline.campaigns import Split, judge_campaign
+from gateway.offline.campaigns import Split, judge_runs, split_runs
 from gateway.records import json_line
 from gateway.words import known
 
@@ -43,14 +44,10 @@ def evaluate(
         contained = ", ".join(held.estimators)
         raise ConfigurationError(f"{calibration}: contains no calibration for {chosen}, only {contained}")
     with counted("reading drives") as on_run:
-        judged = judge_campaign(
-            loaded,
-            held.for_core(),
-            batch_settings(window_s),
-            estimator=chosen,
-            split=split,
-            on_run=on_run,
-        )
+        runs = split_runs(loaded, batch_settings(window_s), on_run=on_run)
+    for remark in dict.fromkeys(chain.from_iterable(run.log.remarks for run in runs)):
+        click.echo(remark, err=True)
+    judged = judge_runs(loaded, runs, held.for_core(), chosen, split)
     table = error_table(judged, loaded.vehicle, chosen)
     assessment = assess_evaluation(loaded.vehicle, held, BatchSet(split), table)
     [verdict] = verdicts_of(assessment)
@@ -65,9 +62,10 @@ def evaluate(
 def text_of(table: ErrorTable) -> str:
     """The table as a person reads it."""
     errors = table.errors
+    rejected = ", ".join(f"{reason} ({n})" for reason, n in errors.rejected_by_reason.items())
+    reasons = f": {rejected}" if rejected else ""
     lines = [
-        f"{table.estimator}: {errors.n_batches} batches, {errors.n_rejected} rejected "
-        f"{errors.rejected_by_reason or ''}".rstrip(),
+        f"{table.estimator}: {errors.n_batches} batches, {errors.n_rejected} rejected{reasons}",
         f"{'':14}{'mean |e|':>10}{'+ misses':>10}{'bias':>9}{'std':>9}{'max':>9}{'mean |e|':>12}{'covered':>10}"
         f"{'+- (95 %)':>11}{'score':>9}",
         _row("payload", errors.payload),

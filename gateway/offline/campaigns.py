@@ -114,6 +114,7 @@ def facts_of_log(
         clock=tuple(report.remarks_on_clock()),
         silent=_silent(report.decoder, motion, signal_map) if report.decoder else {},
         mismatches=tuple((one.text, one.share, one.signals) for one in report.causes()),
+        remarks=tuple(report.remarks()),
     )
 
 
@@ -157,20 +158,13 @@ def inspect(
     return inspect_drives(split, campaign.vehicle, settings, has_roll_rate=has_roll_rate)
 
 
-def judge_campaign(
-    campaign: Campaign,
-    calibrated: CalibratedVehicle,
-    settings: BatchSettings,
-    *,
-    estimator: str,
-    split: Split = "validation",
-    on_run: OnRun = lambda done, of: None,
+def judge_runs(
+    campaign: Campaign, runs: Sequence[InspectedRun], calibrated: CalibratedVehicle, estimator: str, split: Split
 ) -> list[Judged]:
     """Every batch of one part of every run with its estimate.
 
     Raises CalibrationImpossibleError if that part has no batch to judge.
     """
-    runs = split_runs(campaign, settings, on_run=on_run)
     judged = judge((part for run in runs for part in _judged_parts(run, split)), calibrated, estimator)
     if not judged:
         raise CalibrationImpossibleError(

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from click.testing import Result
+from support.calibrated import calibration_file
 from support.commands import called
 
 from gateway.calibration.campaign_file import load_campaign
@@ -172,16 +173,20 @@ def test_every_log_at_fault_is_named_and_the_rest_goes_on(folder: Path) -> None:
     assert (kinds(found)[1], kinds(found)[2]) == (["fault:same_drive"], ["fault:same_drive"])
 
 
-def test_a_log_whose_clock_was_set_is_named(folder: Path) -> None:
+def test_a_log_whose_clock_was_set_is_named(folder: Path, tmp_path: Path) -> None:
     lines = gzip.decompress(next(folder.glob("04_*/can.log.gz")).read_bytes()).splitlines(keepends=True)
     half = len(lines) // 2
     later = [re.sub(rb"\((\d+)", lambda stamp: b"(%d" % (int(stamp[1]) - 40), line) for line in lines[half:]]
     (folder / "set.log").write_bytes(b"".join([*lines[:half], *later]))
     run4 = re.sub(r'log = ".*"', 'log = "set.log"', table_of(folder, 4))
-    _, found = check(altered(folder, "set", run4=run4))
+    campaign, told = altered(folder, "set", run4=run4), "its stamps step back 1 time, by up to 0:00:39."
+    _, found = check(campaign)
     assert "warning:log_clock" in kinds(found)[2]
-    assert "its stamps step back 1 time, by up to 0:00:39." in json.dumps(found)
-    assert all("log_clock" not in told for number, findings in kinds(found).items() if number != 2 for told in findings)
+    assert told in json.dumps(found)
+    assert all("log_clock" not in one for number, findings in kinds(found).items() if number != 2 for one in findings)
+    (tmp_path / "van.json").write_text(calibration_file().to_json(), encoding="utf-8")
+    judged = called("evaluate", campaign, "--calibration", tmp_path / "van.json", *WINDOW)
+    assert f"set.log: {told}" in judged.stderr
 
 
 def test_faults_that_leave_one_load_of_several_are_refused(folder: Path) -> None:

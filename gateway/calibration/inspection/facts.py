@@ -107,7 +107,8 @@ class LogFacts:
     ``duration_s`` is of the whole log, ``span_ns`` the first and last stamp of the run's piece of it, None if that
     piece is empty. ``unreadable`` says why nothing could be read, ``damage`` what was lost of it, ``clock`` where its
     stamps do not run as a clock does, ``silent`` why a mapped signal has no valid sample. ``mismatches`` say which
-    frames do not fit the signal map: a sentence, their share of the message, and the signals that suffer.
+    frames do not fit the signal map: a sentence, their share of the message, and the signals that suffer. ``remarks``
+    are all that reading says to a person.
     """
 
     sha256: str = ""
@@ -119,6 +120,7 @@ class LogFacts:
     clock: tuple[str, ...] = ()
     silent: Mapping[Signal, str] = field(default_factory=dict)
     mismatches: tuple[tuple[str, float, frozenset[Signal]], ...] = ()
+    remarks: tuple[str, ...] = ()
 
     def is_of_same_drive(self, other: "LogFacts") -> bool:
         """Whether both are of one log and their pieces of it overlap."""

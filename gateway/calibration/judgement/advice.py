@@ -208,6 +208,8 @@ def _accuracy(judgement: Judgement, steps: Sequence[Step]) -> str:
         return f"{ahead}How well it weighs is not tested: no drive was kept aside to judge by."
     errors = judgement.tables[judgement.unseen].errors
     payload, share = errors.payload, errors.front_share
+    if payload.mean_abs is None:
+        return f"Over the {PART_NAMES[judgement.unseen]} it weighs nothing: no batch has an answer."
     return (
         f"Over the {PART_NAMES[judgement.unseen]} it weighs payloads to {decimal(payload.mean_abs, ' kg', 1)} on "
         f"average and {decimal(payload.max_abs, ' kg', 1)} at worst, front shares to "
