@@ -15,12 +15,14 @@ from support.bus_drive import START_NS, white_noise
 from support.commands import called
 from support.patience import PATIENCE_S, wait_until
 
+from gateway.bus.frames import take
 from gateway.bus.listen import LiveSource, SourceCounts
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import load_signal_map
 from gateway.bus.sink import BusSink
 from gateway.cli import record
 from gateway.errors import SpringscaleError
+from gateway.records import Signal
 
 SIGNAL_MAP = load_signal_map("springscale:reference")
 DRIVE = white_noise(20.0, START_NS, seed=1)
@@ -114,6 +116,17 @@ def test_frames_carry_the_channel_of_the_map_and_else_that_of_the_bus(
     lines = gzip.decompress((tmp_path / "drive.log.gz").read_bytes()).decode().splitlines()
     assert {line.split()[1] for line in lines} == {map_channel or tmp_path.name}
     assert sum(map(len, open_log(tmp_path / "drive.log.gz", load_signal_map(str(signals)))[0])) == len(DRIVE)
+
+
+def test_a_silent_message_and_an_adapters_own_clock_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def played(source: LiveSource) -> None:
+        source.inbox.put(take(DRIVE, DRIVE.can_id != SIGNAL_MAP.message_of(Signal.SPEED).frame_id))
+        source._tally["clock_sets"] = 1
+
+    monkeypatch.setattr(LiveSource, "start", played)
+    said = recorded(tmp_path / "drive.log.gz").output
+    assert "no frame of GPS_SPEED (130) for speed\n" in said
+    assert "the adapter counts from a start of its own: dated by this computer's clock, 1 time\n" in said
 
 
 def test_frames_that_the_kernel_lost_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
