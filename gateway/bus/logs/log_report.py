@@ -57,6 +57,10 @@ _KNOWN_LINES: Final = (
     (r"\(\d{4}-\d\d-\d\d", "stamps are dates (candump -tA): record with candump -L alone"),
     (r"\(-?\d+,\d+\)|(\d+\)\s+)?-?\d+,\d+\s", "stamps have a decimal comma: write a point"),
     (r"\(-|\s*-\d", "the stamp is negative"),
+    (r"\(\d{9,10}\)", "stamps are whole seconds: has a tool cut their fractions off?"),
+    (r"\(\d{11,}", "stamps are not seconds since 1970, but perhaps a fraction of it such as milliseconds"),
+    (r".*\xa0", "its spaces are no-break spaces: replace them"),
+    (r"\S+ \S+ 0x", "identifiers begin with 0x: cut that off"),
     (r"\(?\d+(\.\d+)?\)?\s+\S+\s+[0-9A-F]{3,8}\s+\[\d+\]|\w+\s+[0-9A-F]{3,8}\s+\[\d+\]",
      "this is candump's output for the screen: record with candump -L"),
     (r"\S.*\(\d+\.\d+\) \S+ [0-9A-F]{3,8}#", "something is written before the stamp, as in a system's log: cut it off"),
@@ -80,8 +84,6 @@ class RejectedLines:
         where = f", first in line {self.first_lines[0]}" if self.first_lines else ""
         fitting = (what for form, what in _KNOWN_LINES if re.match(form, self.text, re.IGNORECASE))
         known = next((what for what in fitting if not set(path.suffixes) & set(what.split())), None)
-        if known is None and reason is LogReject.BAD_TIME:
-            known = "stamps are not seconds since 1970, but perhaps a fraction of it such as milliseconds"
         what = (f": {known}" if known else "") + (f": {self.text[:SHOWN_CHARS]!r}" if self.text else "")
         return f"left out, {str(reason).replace('_', ' ')}: {self.count}{where}{what}"
 
@@ -299,7 +301,8 @@ class LogReport:
             return f"the mapped frames are on {seen} only; correct channel in the signal map"
         if self.n_rejected > TELLING_SHARE * self.frames:
             reason, lines = max(self.rejects.items(), key=lambda each: each[1].count)
-            return f"holds no CAN frame that can be read; {lines.told(reason, self.path)}; {AS_CANDUMP}"
+            hint = "" if {".asc", ".trc"} & set(self.path.suffixes) else f"; {AS_CANDUMP}"
+            return f"holds no CAN frame that can be read; {lines.told(reason, self.path)}{hint}"
         if self.remote_frames:
             return f"of the mapped identifiers it has only remote frames ({self.remote_frames}), which carry no data"
         if self.frames:

@@ -23,6 +23,7 @@ from gateway.bus.signals.mapping import (
     id_name,
 )
 from gateway.records import ASIDE, F64, I64, U8, U32, Bool, Frames, Motion, Signal
+from gateway.words import counted
 
 J1939_LAST_VALID_BYTE: Final = 0xFA  # SAE J1939-71: a most significant byte above this is no measurement
 TELLING_SHARE: Final = 0.01  # chosen: of frames, of a log or message; so many refused are why a sensor is missing
@@ -151,9 +152,10 @@ class _MessageReader:
 
     def remarks(self) -> Iterator[Remark]:
         if lengths := dict(self._wrong_lengths):
-            n, have = sum(lengths.values()), f"{min(lengths)}" + (f" to {max(lengths)}" if len(lengths) > 1 else "")
+            n, short, long = sum(lengths.values()), min(lengths), max(lengths)
+            have = counted(long, "byte") if short == long else f"{short} to {long} bytes"
             text = (
-                f"{told_share(n, self.n_frames)} frames have {have} bytes, the database says {self.mapped.length}; "
+                f"{told_share(n, self.n_frames)} frames have {have}, the database says {self.mapped.length}; "
                 "if the device sends so, correct the length there"
             )
             yield Remark(f"{self.name}: {text}", n / self.n_frames, self.signals)
