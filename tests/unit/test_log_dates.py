@@ -1,5 +1,6 @@
 """Dates, zones and stamps of logs as recorders write them: each is read, or the log says what it lacks."""
 
+import gzip
 import time
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -41,8 +42,17 @@ DATES = {
     "ISO": "2023-03-10T15:06:12",
     "ISO with a blank and a comma": "2023-03-10 15:06:12,000",
     "ISO with its zone": "2023-03-10T16:06:12+01:00",
+    "ISO with its zone after a blank": "2023-03-10 16:06:12 +0100",
+    "ISO with the hours of its zone": "2023-03-10T10:06:12-05",
+    "ISO and UTC": "2023-03-10 15:06:12 UTC",
+    "ISO and 12 hours": "2023-03-10 03:06:12 PM",
     "German by numbers": "10.03.2023 15:06:12",
+    "by numbers and 12 hours": "10.03.2023 03:06:12 pm",
 }
+NO_DATES = ("2023-03-10 15:06:12 CET", "10.03.23 15:06:12", "03/10/2023 15:06:12", "Fri Mar 10 24:00:00 2023",
+            "Fri Mar 10 23:59:60 2023", "Fri Mar 10 15:06:12 1601", "Sun Jan 06 00:00:00 1980",
+            "Fri Mar 10 15:06:12 2300")  # fmt: skip
+
 MONTHS = {"janv.": 1, "gen": 1, "ene": 1, "sty": 1, "1月": 1, "févr.": 2, "Mai": 5, "juin": 6, "juil.": 7, "ago": 8,
           "wrz": 9, "Okt": 10, "lis": 11, "Dez": 12, "déc.": 12}  # fmt: skip
 
@@ -107,7 +117,16 @@ def test_a_garbled_line_leaves_the_number_base_as_it_is(tmp_path):
 REFUSED = {
     "dates": ("a.log", "(2021-07-26 04:40:55.012500) can0 123#01\n", "line 1: stamps are dates"),
     "screen": ("a.log", " (1627274455.012500)  can0  123   [2]  01 02\n", "output for the screen"),
-    "asc as log": ("a.log", asc("2023-03-10 15:06:12"), "name it so"),
+    "asc as log": ("a.log", asc("2023-03-10 15:06:12"), "is not what its name says, but .* name it .asc$"),
+    "asc as trc": ("a.trc", asc("2023-03-10 15:06:12"), "name it .asc$"),
+    "trc as asc": ("a.asc", ";$FILEVERSION=1.1\n     1)  0.0  Rx  0123  1  01\n", "name it .trc$"),
+    "candump as asc": ("a.asc", "(1627274455.0125) can0 123#01\n", "candump's text; name it .log$"),
+    "candump as blf": ("a.blf", "(1627274455.0125) can0 123#01\n", "name it .log$"),
+    "packed twice": ("a.log.gz", gzip.compress(gzip.compress(b"(1627274455.0125) can0 123#01\n")), "packed twice"),
+    "cansend": ("a.log", "123#01\n" * 9, "line 1: no stamp in parentheses stands before the frame"),
+    "a stamp alone": ("a.log", "1627274455.0125 can0 123#01\n" * 9, "line 1: no stamp in parentheses"),
+    "screen with directions": ("a.log", " (1627274455.0125)  can0  RX - -  123   [1]  01\n", "output for the screen"),
+    "garbled asc": ("a.asc", asc("2023-03-10 15:06:12", "0.5 1 zz Rx d 1 11\n"), "zz Rx d 1 11'$"),
     "a table": ("a.log", "Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n1,123,0,Rx,0,1,01\n", "this is a table"),
     "remote frames": ("a.log", "(1627274455.0125) can0 123#R\n" * 3, r"only remote frames \(3\), which carry no data"),
     "remote frames in asc": ("a.asc", asc("2023-03-10 15:06:12", "0.5 1 123 Rx r 1\n"), r"only remote frames \(1\)"),
@@ -154,7 +173,32 @@ def test_a_header_of_a_trc_log_that_cannot_be_read_ends_no_reading(line, tmp_pat
     assert report.frames == report.wanted + report.n_rejected
 
 
-def test_an_impossible_date_is_none(tmp_path):
-    frames, report = read(tmp_path / "a.asc", asc("Thu Apr 31 10:00:00 2022"))
-    assert (len(frames), report.is_dated) == (1, False)
-    assert any("its date 'Thu Apr 31 10:00:00 2022'" in remark for remark in report.remarks())
+@pytest.mark.parametrize("date", [*NO_DATES, "Thu Apr 31 10:00:00 2022"])
+def test_a_date_that_is_ambiguous_or_impossible_is_none(date, tmp_path):
+    """It became a wrong one, or the stamps were blamed."""
+    frames, report = read(tmp_path / "a.asc", asc(date))
+    assert (frames.t_ns.tolist(), report.is_dated) == ([500_000_000], False)
+    assert any(f"its date '{date}' cannot be " in remark for remark in report.remarks())
+
+
+def test_an_impossible_date_of_a_block_leaves_that_of_the_header(tmp_path):
+    """python-can writes the header by the computer's clock, the block by the adapter's."""
+    text = asc("Fri Mar 10 15:06:12.000 2023", "Begin Triggerblock Thu Jan 01 00:00:00.000 1970\n", ASC_FRAME)
+    assert read(tmp_path / "a.asc", text)[0].t_ns.tolist() == [round(NOON.timestamp() * 1e9) + 500_000_000]
+
+
+@pytest.mark.parametrize(("day", "is_told"), [("Oct 25", True), ("Mar 29", True), ("Oct 24", False)])
+def test_an_hour_in_which_clocks_are_set_is_told(day, is_told, tmp_path):
+    _, report = read(tmp_path / "a.asc", asc(f"Sun {day} 02:30:00 2026"), BERLIN)
+    assert any("in an hour in which clocks are set" in remark for remark in report.remarks()) == is_told
+
+
+@pytest.mark.parametrize("stated", ["44995.5", "44995,5"])
+def test_the_start_of_a_trc_may_have_a_decimal_comma(stated, tmp_path):
+    frames, _ = read(tmp_path / "a.trc", f";$FILEVERSION=1.1\n;$STARTTIME={stated}\n     1)  0.0  Rx  0123  1  01\n")
+    assert frames.t_ns.tolist() == [round(NOON.replace(hour=12, minute=0, second=0).timestamp() * 1e9)]
+
+
+def test_a_start_time_of_a_trc_that_cannot_be_read_is_told(tmp_path):
+    _, report = read(tmp_path / "a.trc", ";   Start time: 3/10/2023 3:06:12 PM\n     1)      500 0123 2 01 02\n")
+    assert any("its date '3/10/2023 3:06:12 PM' cannot be read" in remark for remark in report.remarks())

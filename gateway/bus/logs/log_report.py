@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.bus.frames import gathered
-from gateway.bus.logs.wall_clock import ns_since_1970
+from gateway.bus.frames import LAST_SECOND, gathered
+from gateway.bus.logs.wall_clock import is_doubled, ns_since_1970
 from gateway.bus.signals import Decoder
 from gateway.bus.signals.decode import TELLING_SHARE, Remark
 from gateway.bus.signals.mapping import IdFilter
@@ -26,7 +26,7 @@ NAMED_CHANNELS: Final = 8  # chosen: likewise
 KEPT_CHANNELS: Final = 32  # chosen: in memory; damaged lines name any number
 CHUNK_FRAMES: Final = 32_768  # chosen: given out at once: large enough that the decoder's own steps cost little
 SHOWN_CHARS: Final = 60  # chosen: of a line that cannot be read
-AS_CANDUMP: Final = "candump logs are recorded with candump -L"
+AS_CANDUMP: Final = "; candump logs are recorded with candump -L"
 JUDGED_FRAMES: Final = 1000  # chosen: least number whose stamps are judged
 JUDGED_SECONDS: Final = 3.0  # chosen: likewise, before the end of the log is reached
 WHOLE_PER_S: Final = 10.0  # chosen: more frames a second all on whole seconds are no coincidence
@@ -57,10 +57,10 @@ _KNOWN_LINES: Final = (
     (r"\(\d{4}-\d\d-\d\d", "stamps are dates (candump -tA): record with candump -L alone"),
     (r"\(-?\d+,\d+\)|(\d+\)\s+)?-?\d+,\d+\s", "stamps have a decimal comma: write a point"),
     (r"\(-|\s*-\d", "the stamp is negative"),
-    (r"\(?\d+(\.\d+)?\)?\s+\S+\s+[0-9A-F]{3,8}\s+\[\d+\]|\w+\s+[0-9A-F]{3,8}\s+\[\d+\]",
+    (r"(\(?\d+(\.\d+)?\)?\s+)?\S+\s+([RT]X\s+\S\s+\S\s+)?[0-9A-F]{3,8}\s+\[\d+\]",
      "this is candump's output for the screen: record with candump -L"),
     (r"\S.*\(\d+\.\d+\) \S+ [0-9A-F]{3,8}#", "something is written before the stamp, as in a system's log: cut it off"),
-    (r"date \S|;|\d+\)\s+\d", "this is the text of an .asc or a .trc log: name it so"),
+    (r"[^(]*#", "no stamp in parentheses stands before the frame"),
     (r"[^,;]+([,;][^,;]*){3,}", "this is a table: record with candump -L"),
     (r"\d+\.\d+\s+\S+\s+\w+\s+[RT]x\b", "messages have names instead of identifiers: export the log with numbers"),
 )  # fmt: skip
@@ -75,12 +75,12 @@ class RejectedLines:
     first_lines: list[int] = field(default_factory=list)
     text: str = ""
 
-    def told(self, reason: LogReject, path: Path) -> str:
+    def told(self, reason: LogReject) -> str:
         """ "left out, bad time: 9, first in line 1: stamps have a decimal comma: write a point: '(1,5) can0'" """
         where = f", first in line {self.first_lines[0]}" if self.first_lines else ""
-        fitting = (what for form, what in _KNOWN_LINES if re.match(form, self.text, re.IGNORECASE))
-        known = next((what for what in fitting if not set(path.suffixes) & set(what.split())), None)
-        if known is None and reason is LogReject.BAD_TIME:
+        known = next((what for form, what in _KNOWN_LINES if re.match(form, self.text, re.IGNORECASE)), None)
+        is_whole = re.match(r"\(\d+\.?\d*\)|\d+\.\d+\s", self.text)
+        if known is None and reason is LogReject.BAD_TIME and is_whole:
             known = "stamps are not seconds since 1970, but perhaps a fraction of it such as milliseconds"
         what = (f": {known}" if known else "") + (f": {self.text[:SHOWN_CHARS]!r}" if self.text else "")
         return f"left out, {str(reason).replace('_', ' ')}: {self.count}{where}{what}"
@@ -143,13 +143,18 @@ class LogReport:
 
     def begin_at(self, date: datetime | None, zone: tzinfo | None, told: str) -> int:
         """Take the date of the header, which says ``told``; nanoseconds since 1970, 0 without one."""
-        if date is None:
-            note = f"its date {told[:SHOWN_CHARS]!r} cannot be read"
-            self.notes += [] if note in self.notes else [note]
+        start_ns = None if date is None else ns_since_1970(date, zone)
+        if date is None or start_ns is None or not FIRST_DATED_NS <= start_ns <= LAST_SECOND * NS_PER_S:
+            self._note(f"its date {told[:SHOWN_CHARS]!r} {'cannot be read' if date is None else 'cannot be right'}")
             return self.start_ns or 0
-        self.has_wall_clock, self.zone = date.tzinfo is None, zone
-        self.start_ns = ns_since_1970(date, zone)
-        return self.start_ns
+        if is_doubled(date, zone):
+            self._note(f"its date {told[:SHOWN_CHARS]!r} is in an hour in which clocks are set: it may be an hour off")
+        self.has_wall_clock, self.zone, self.start_ns = date.tzinfo is None, zone, start_ns
+        return start_ns
+
+    def _note(self, text: str) -> None:
+        if text not in self.notes:
+            self.notes.append(text)
 
     def count_wanted(self, t_ns: I64) -> None:
         """Count frames that are given out, at least one, by their stamps in order of arrival."""
@@ -218,7 +223,7 @@ class LogReport:
         if told := ", ".join(counted(n, noun) + rest for n, noun, rest in others if n):
             yield f"{self.path}: left out: {told}"
         for reason, lines in self.rejects.items():
-            yield f"{self.path}: {lines.told(reason, self.path)}"
+            yield f"{self.path}: {lines.told(reason)}"
         if len(self.channels) > 1 and not self.other_channel:
             seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
             yield f"{self.path}: mapped frames are on {seen}; if these are one bus twice, name one in the map"
@@ -297,7 +302,8 @@ class LogReport:
             return f"the mapped frames are on {seen} only; correct channel in the signal map"
         if self.n_rejected > TELLING_SHARE * self.frames:
             reason, lines = max(self.rejects.items(), key=lambda each: each[1].count)
-            return f"holds no CAN frame that can be read; {lines.told(reason, self.path)}; {AS_CANDUMP}"
+            is_candump = not {".asc", ".trc", ".blf", ".mf4"} & set(self.path.suffixes)
+            return f"holds no CAN frame that can be read; {lines.told(reason)}{AS_CANDUMP if is_candump else ''}"
         if self.remote_frames:
             return f"of the mapped identifiers it has only remote frames ({self.remote_frames}), which carry no data"
         if self.frames:

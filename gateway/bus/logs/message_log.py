@@ -156,7 +156,7 @@ class _TrcLog(_TextLog):
         line = told[0]
         name, _, stated = (part.strip() for part in line[1:].partition("="))
         if name == "$STARTTIME":
-            days = float(stated) if re.fullmatch(r"\d{1,6}(\.\d*)?", stated) else -1.0
+            days = float(stated.replace(",", ".")) if re.fullmatch(r"\d{1,6}([.,]\d*)?", stated) else -1.0
             self.start_ns = self.report.begin_at(days_since_1899(days) if days > 0 else None, self.zone, stated)
         elif name == "$FILEVERSION" and stated not in TRC_VERSIONS:
             raise LogUnreadableError(
@@ -165,8 +165,8 @@ class _TrcLog(_TextLog):
             )
         elif name in ("$FILEVERSION", "$COLUMNS"):
             self.header[name] = line
-        elif "start time:" in line.lower() and self.report.start_ns is None and (date := date_in(line)) is not None:
-            self.start_ns = self.report.begin_at(date, self.zone, line)
+        elif "start time:" in line.lower() and self.report.start_ns is None:
+            self.start_ns = self.report.begin_at(date_in(line), self.zone, line.partition(":")[2].strip())
 
     def frame_in(self, line: str) -> str | None:
         return line

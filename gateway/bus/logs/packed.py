@@ -100,11 +100,13 @@ class InflatedStream(io.RawIOBase):
         super().close()
 
     def _next_member(self) -> bool:
-        """Whether another member follows; zeros and other bytes after the last one are padding."""
+        """Whether another member follows; zeros after the last one are padding. Raises OSError for other bytes."""
         self._packed = self._inflater.unused_data
         if len(self._packed) < _LONGEST_MAGIC:
             self._packed += self._file.read(PACKED_BYTES)
         if not self._packed.startswith(self._packing.magics):
+            if self._packed.strip(b"\0"):
+                raise OSError(f"something that is not {self._packing.name} follows the packed log")
             return False
         self._inflater = self._packing.new_inflater()
         return True
