@@ -18,7 +18,7 @@ from gateway.bus.signals.decode import TELLING_SHARE, Remark
 from gateway.bus.signals.mapping import IdFilter
 from gateway.errors import LogUnreadableError
 from gateway.records import FIRST_DATED_NS, I64, U32, Bool, Frames, iso_utc
-from gateway.units import NS_PER_S
+from gateway.units import NS_PER_S, S_PER_DAY
 from gateway.words import counted
 
 KEPT_LINE_NUMBERS: Final = 5  # chosen: what a person looks at
@@ -177,8 +177,17 @@ class LogReport:
 
     @property
     def is_dated(self) -> bool:
-        """Whether its stamps are dates; those of a log without frames are not."""
-        return self.first_ns is not None and self.first_ns >= FIRST_DATED_NS
+        """Whether all its stamps are dates; those of a log without frames are not."""
+        return self.first_ns is not None and self.span_ns[0] >= FIRST_DATED_NS
+
+    @property
+    def is_partly_dated(self) -> bool:
+        return self.span_ns[0] < FIRST_DATED_NS <= self.span_ns[1]
+
+    @property
+    def is_in_order(self) -> bool:
+        """Whether its stamps have one zero and step back no further than buffers do."""
+        return not self.is_partly_dated and self._steps_ns[0] >= -STEP_BACK_S * NS_PER_S
 
     @property
     def other_identifiers(self) -> int:
@@ -242,7 +251,8 @@ class LogReport:
         if self.first_ns is None:
             return
         if not self.is_dated:
-            yield f"{self.path}: has no date: times count from the zero of its stamps"
+            who = "a part of it has" if self.is_partly_dated else "has"
+            yield f"{self.path}: {who} no date: times count from the zero of its stamps"
         elif self.has_wall_clock and self.zone is None:
             yield (
                 f"{self.path}: its date states no zone, it is read as UTC; if that is wrong, state time_zone in the "
@@ -251,6 +261,8 @@ class LogReport:
         back_s, leap_s = -self._steps_ns[0] / NS_PER_S, self._steps_ns[1] / NS_PER_S
         if back_s > STEP_BACK_S or 8 * self.out_of_order > self.wanted:
             times, what = counted(self.out_of_order, "time"), "is it several logs in one, or was the clock set?"
+            if S_PER_DAY - LATE_START_H * 3600.0 < back_s <= S_PER_DAY:
+                what = "do they count from midnight?"
             yield f"{self.path}: its stamps step back {times}, by up to {timedelta(seconds=back_s)}: {what}"
         if leap_s > LEAP_S:
             yield f"{self.path}: its stamps leap forward by {timedelta(seconds=leap_s)}: a pause, or was the clock set?"
@@ -265,6 +277,8 @@ class LogReport:
             return None
         if self._n_whole_seconds == self.wanted > WHOLE_PER_S * self.span_s:
             return f"its {self.wanted} stamps are whole seconds: has a tool cut their fractions off?"
+        if self.out_of_order and self._steps_ns[1] == 0:
+            return "its lines are in reverse order of time: turn them over"
         if not self.is_dated and 8 * self.out_of_order > self.wanted:
             return "its stamps are the pauses between frames (candump -td): record with candump -L alone"
         if self.wanted > MOST_PER_S * self.span_s:
@@ -293,6 +307,16 @@ class LogReport:
         """
         if (why := self._why_unusable()) is not None:
             raise LogUnreadableError(f"{self.path}: {why}")
+
+    def require_dates(self) -> None:
+        """After reading: as require_frames, and raise LogUnreadableError if a stamp is no date."""
+        self.require_frames()
+        if not self.is_dated:
+            why = "a part of it has no date" if self.is_partly_dated else "; ".join(("has no date", *self.notes))
+            raise LogUnreadableError(
+                f"{self.path}: {why}: nothing tells which month and calibration it belongs to; weigh it with "
+                "springscale estimate"
+            )
 
     def _why_unusable(self) -> str | None:
         if self.wanted:
