@@ -120,7 +120,7 @@ def _logs_record(drives: Drives) -> Record:
     """What became of the logs."""
     left_out = {log: [why.removeprefix(f"{log}: ")] for log, why in drives.unreadable.items()}
     left_out |= {
-        log: [f"of the same time as {first}, which counts once: of two drives, record both with their date"]
+        log: [f"of the same driving as {first}, which counts once: if it is another drive, record both with their date"]
         for log, first in drives.repeated.items()
     }
     left_out |= {

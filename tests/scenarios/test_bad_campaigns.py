@@ -1,11 +1,13 @@
 """Campaigns gone wrong, from log files through the command line: each is told what is wrong and how to mend it."""
 
+import gzip
 import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import can
 import pytest
 from click.testing import Result
 from support.commands import called
@@ -169,6 +171,20 @@ def test_every_log_at_fault_is_named_and_the_rest_goes_on(folder: Path) -> None:
     assert told[4] == ["warning:log_damaged"]
     exit_code, found = check(altered(folder, "twice", (1, 9, 10), run9=runs["run9"]))
     assert (kinds(found)[1], kinds(found)[2]) == (["fault:same_drive"], ["fault:same_drive"])
+
+
+@pytest.mark.parametrize("copied", ["unpacked.log", "exported.asc"])
+def test_a_copy_of_a_log_in_another_form_counts_once(copied: str, folder: Path) -> None:
+    packed, copy = next(folder.glob("10_*/can.log.gz")), folder / copied
+    if copied.endswith(".log"):
+        copy.write_bytes(gzip.decompress(packed.read_bytes()))
+    else:
+        with can.LogReader(packed) as frames, can.ASCWriter(copy) as writer:
+            for frame in frames:
+                writer.on_message_received(frame)
+    again = re.sub('log = ".*"', f'log = "{copied}"', table_of(folder, 10))
+    exit_code, found = check(altered(folder, "copied", (1, 10, 9), run9=again))
+    assert (exit_code, kinds(found)[2], kinds(found)[3]) == (0, [], ["fault:same_drive"])
 
 
 def test_faults_that_leave_one_load_of_several_are_refused(folder: Path) -> None:
