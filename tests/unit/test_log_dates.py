@@ -1,6 +1,7 @@
 """Dates, zones and stamps of logs as recorders write them: each is read, or the log says what it lacks."""
 
 import gzip
+import os
 import time
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -122,6 +123,8 @@ REFUSED = {
     "trc as asc": ("a.asc", ";$FILEVERSION=1.1\n     1)  0.0  Rx  0123  1  01\n", "name it .trc$"),
     "candump as asc": ("a.asc", "(1627274455.0125) can0 123#01\n", "candump's text; name it .log$"),
     "candump as blf": ("a.blf", "(1627274455.0125) can0 123#01\n", "name it .log$"),
+    "channels by name": ("a.asc", asc("2023-03-10 15:06:12", "0.5 CAN1 123 Rx d 1 11\n"), "channels have names"),
+    "seconds without a point": ("a.log", "(1627274455) can0 123#01\n" * 9, "line 1: stamps are whole seconds"),
     "packed twice": ("a.log.gz", gzip.compress(gzip.compress(b"(1627274455.0125) can0 123#01\n")), "packed twice"),
     "cansend": ("a.log", "123#01\n" * 9, "line 1: no stamp in parentheses stands before the frame"),
     "a stamp alone": ("a.log", "1627274455.0125 can0 123#01\n" * 9, "line 1: no stamp in parentheses"),
@@ -151,6 +154,12 @@ def test_a_log_whose_stamps_or_form_cannot_be_used_names_the_cause(kind, tmp_pat
     with pytest.raises(LogUnreadableError, match=said) as refusal:
         read(tmp_path / name, text)[1].require_frames()
     assert "map of this vehicle" not in str(refusal.value)
+
+
+def test_a_pipe_is_not_said_to_be_empty(tmp_path):
+    os.mkfifo(tmp_path / "a.log")
+    with pytest.raises(LogUnreadableError, match="is a pipe or a device"):
+        open_whole_log(tmp_path / "a.log")
 
 
 @pytest.mark.parametrize(

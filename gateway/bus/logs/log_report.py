@@ -57,11 +57,13 @@ _KNOWN_LINES: Final = (
     (r"\(\d{4}-\d\d-\d\d", "stamps are dates (candump -tA): record with candump -L alone"),
     (r"\(-?\d+,\d+\)|(\d+\)\s+)?-?\d+,\d+\s", "stamps have a decimal comma: write a point"),
     (r"\(-|\s*-\d", "the stamp is negative"),
+    (r"\(\d{1,10}\)", "stamps are whole seconds: has a tool cut their fractions off?"),
     (r"(\(?\d+(\.\d+)?\)?\s+)?\S+\s+([RT]X\s+\S\s+\S\s+)?[0-9A-F]{3,8}\s+\[\d+\]",
      "this is candump's output for the screen: record with candump -L"),
     (r"\S.*\(\d+\.\d+\) \S+ [0-9A-F]{3,8}#", "something is written before the stamp, as in a system's log: cut it off"),
     (r"[^(]*#", "no stamp in parentheses stands before the frame"),
     (r"[^,;]+([,;][^,;]*){3,}", "this is a table: record with candump -L"),
+    (r"\d+\.\d+\s+[A-Z]\S*\s+[0-9A-F]+x?\s+[RT]x\b", "channels have names: export the log with numbers"),
     (r"\d+\.\d+\s+\S+\s+\w+\s+[RT]x\b", "messages have names instead of identifiers: export the log with numbers"),
 )  # fmt: skip
 """Lines that other tools and settings write, and what to do: the first that fits is told."""

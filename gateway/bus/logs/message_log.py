@@ -117,7 +117,10 @@ class _AscLog(_TextLog):
         re.IGNORECASE,
     )
     _STAMP = re.compile(r"\s*(-?\d{1,12})(?:\.(\d{1,9})\d*)?(?=\s)")
-    _FRAME = re.compile(r"\s*-?\d\S*\s+(?:CANFD\s+\d+|\d+)\s+(?:.*\s)?(?:[RT]x|TxRq|ErrorFrame)\b", re.IGNORECASE)
+    _FRAME = re.compile(
+        r"\s*-?\d\S*\s+(?:(?:CANFD\s+\d+|\d+)\s+(?:.*\s)?(?:[RT]x|TxRq|ErrorFrame)\b|\S+\s+\S+\s+[RT]x\s+d\s)",
+        re.IGNORECASE,
+    )
 
     def __init__(self, selection: Selection) -> None:
         super().__init__(selection)

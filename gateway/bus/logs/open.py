@@ -80,6 +80,8 @@ def _open(
         raise LogUnreadableError(f"{path}: is a folder, not a log file")
     if not path.exists():
         raise LogUnreadableError(f"{path}: no such file")
+    if not path.is_file():
+        raise LogUnreadableError(f"{path}: is a pipe or a device: write a file first")
     if suffix not in READERS:
         known, packed = " ".join(filter(None, READERS)), ", ".join(PACKED_SUFFIXES)
         raise LogUnreadableError(
