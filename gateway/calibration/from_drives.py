@@ -24,7 +24,7 @@ from gateway.core.vehicle import Load, Vehicle
 from gateway.errors import CalibrationImpossibleError
 from gateway.estimates.quantity import Z95
 from gateway.model.vehicle_model import VehicleModel
-from gateway.records import F64, iso_utc
+from gateway.records import F64, FIRST_DATED_NS, iso_utc
 from gateway.stated.doubt import Doubt
 
 OnFit = Callable[[str, int, int], None]  # (estimator, steps done, steps in all)
@@ -233,14 +233,15 @@ def _provenance(
     drives = []
     for one in runs:
         run, span_ns = one.identification, one.log.span_ns
+        is_dated = span_ns is not None and span_ns[0] >= FIRST_DATED_NS
         found = taught.load_of(run.name) if taught else None
         drives.append(
             DrivePart(
                 number=run.number,
                 log=run.log,
                 sha256=one.log.sha256,
-                t_start=iso_utc(span_ns[0]) if span_ns else None,
-                t_end=iso_utc(span_ns[1]) if span_ns else None,
+                t_start=iso_utc(span_ns[0]) if span_ns and is_dated else None,
+                t_end=iso_utc(span_ns[1]) if span_ns and is_dated else None,
                 n_batches=sum(not batch.rejected for batch in run.batches),
                 statement=run.statement,
                 found=_found_part(found) if found else None,

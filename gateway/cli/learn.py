@@ -22,6 +22,7 @@ from gateway.cli.calibrate import require_places, tell_doubts, written_and_judge
 from gateway.cli.options import FILE, ZONE, as_json, batch_settings, window
 from gateway.cli.progress import counted, on_share
 from gateway.errors import ConfigurationError
+from gateway.estimates.field_kinds import without_dates
 from gateway.offline.drives_of_logs import Drives, read_drives
 from gateway.records import json_line, rounded
 from gateway.stated.statement import StatementRecord
@@ -92,7 +93,7 @@ def learn(
             on_fit=on_share(on_step, ("cross_spectrum",)),
         )
     verdict = written_and_judged(found.outcome, output, report)
-    record |= {"drives": drives_record(found), "n_drives_unneeded": found.n_unneeded}
+    record |= {"drives": without_dates(drives_record(found)), "n_drives_unneeded": found.n_unneeded}
     of_rows = [{"row": numbers[one["id"]], **one} for one in statements_record(records, assigned, found)]
     record |= {"statements": sorted(of_rows, key=lambda one: one["row"]), "looks_empty": list(found.looking_empty())}
     record |= _verdict_record(found, verdict, output)
@@ -137,6 +138,11 @@ def _logs_record(drives: Drives) -> Record:
             str(log): [f"{one.severity} {one.kind}: {one.text}: {one.advice}" for one in found]
             for log, found in drives.findings.items()
         },
+        "remarks": {
+            str(log): [one.removeprefix(f"{log}: ") for one in remarks]
+            for log, remarks in drives.remarks.items()
+            if remarks
+        },
     }
 
 
@@ -171,8 +177,8 @@ def _logs_told(record: Record) -> Iterator[str]:
     for log, reasons in left_out.items():
         yield from (f"  {log}: left out: {why}" for why in reasons)
     of_finding: dict[str, list[str]] = {}
-    for log, findings in record["findings"].items():
-        for one in findings:
+    for log, found in (*record["findings"].items(), *record["remarks"].items()):
+        for one in found:
             of_finding.setdefault(one, []).append(log)
     for finding, logs in of_finding.items():
         others = f" and {n_of(len(logs) - 1, 'other log')}" if len(logs) > 1 else ""
@@ -199,7 +205,7 @@ def _drives_told(record: Record) -> Iterator[str]:
         found = one["found_without_statement"] or one["found"]
         shown = _kg_told(found) if found else "too little driving"
         stated = _kg_told(one["stated"]) if one["stated"] else "nothing"
-        begun = one["t_start"][:16].replace("T", " ")
+        begun = one["t_start"][:16].replace("T", " ") if one["t_start"] else "no date"
         line = f"{one['number']:>5}  {name:28}  {begun}  {stated:>17}  {shown:>17}  {one['state'] or ''}"
         yield line.rstrip()
     if n := record["n_drives_unneeded"]:
@@ -231,6 +237,6 @@ def _asked(record: Record) -> Iterator[str]:
         looks = "looks" if len(numbers) == 1 else "look"
         yield f"{named} of unknown load {looks} empty. Is that right? Then add to the statements:"
         yield "    from;until;source"
-        yield from (f"    {one['t_start'][:19]}Z;{one['t_end'][:19]}Z;empty" for one in drives)
+        yield from (f"    {one['t_start'][:19]}Z;{one['t_end'][:19]}Z;empty" for one in drives if one["t_start"])
     yield f"{record['output'] or 'no file written'}: id {record['calibration_id']}"
     yield from (f"warning: {one}" for one in record["warnings"] if ": load" not in one)

@@ -38,6 +38,7 @@ class Drives:
     repeated: dict[Path, Path] = field(default_factory=dict)
     faulty: dict[Path, tuple[Finding, ...]] = field(default_factory=dict)
     findings: dict[Path, tuple[Finding, ...]] = field(default_factory=dict)
+    remarks: dict[Path, tuple[str, ...]] = field(default_factory=dict)  # of the reader
 
     @property
     def driven(self) -> tuple[Driven, ...]:
@@ -65,6 +66,7 @@ def read_drives(
         except LogUnreadableError as fault:
             drives.unreadable[log] = str(fault)
             continue
+        drives.remarks[log] = tuple(report.remarks(with_decoder=False))
         facts = facts_of_log(log, motion, motion, report, signal_map)
         found = windows_of_motion(motion, signal_map, settings)
         findings = _findings(motion, found, facts, signal_map, vehicle, settings)

@@ -191,6 +191,16 @@ def test_drives_without_a_date_are_not_taken_for_one(drives: Path, tmp_path: Pat
     assert f"{logs[1]}: left out: of the same driving as {logs[0]}" in said
 
 
+def test_a_drive_without_a_date_is_not_said_to_be_of_1970(drives: Path, tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_bytes(_undated((drives / "01.log").read_bytes()))
+    asked = ("--vehicle", drives / "van.toml", "--signals", SIGNALS, "--output", tmp_path / "vehicle.json", *WINDOW)
+    said = printed("learn", tmp_path / "a.log", *asked)
+    assert f"{tmp_path / 'a.log'}: has no date: times count from the zero of its stamps" in said
+    assert re.search(r"a\.log +no date ", said)
+    assert "1970-" not in said
+    assert [one.t_start for one in load_calibration(tmp_path / "vehicle.json").provenance.drives] == [None]
+
+
 def test_without_a_place_for_the_calibration_nothing_begins(drives: Path) -> None:
     done = called(*learn_of(drives))
     assert done.exit_code == 2

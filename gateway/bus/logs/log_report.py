@@ -222,8 +222,8 @@ class LogReport:
             "ended_early": self.ended_early,
         }
 
-    def remarks(self) -> Iterator[str]:
-        """Warnings for people, a sentence each; none if all was well."""
+    def remarks(self, *, with_decoder: bool = True) -> Iterator[str]:
+        """Warnings for people, a sentence each; none if all was well. Those of the decoder are about single signals."""
         if self.ended_early:
             yield f"{self.path}: {self.ended_early}; everything before was read"
         others = (
@@ -238,9 +238,10 @@ class LogReport:
         if len(self.channels) > 1 and not self.other_channel:
             seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
             yield f"{self.path}: mapped frames are on {seen}; if these are one bus twice, name one in the map"
-        for silent in self.decoder.silent() if self.decoder is not None and self.wanted else ():
+        decoder = self.decoder if with_decoder else None
+        for silent in decoder.silent() if decoder is not None and self.wanted else ():
             yield f"{self.path}: has no frame of {silent}"
-        refused = () if self.decoder is None else self.decoder.remarks()
+        refused = () if decoder is None else decoder.remarks()
         for note in (*self.notes, *(remark.text for remark in refused)):
             yield f"{self.path}: {note}"
         yield from self._remarks_on_time()
