@@ -168,6 +168,8 @@ UNDATED = {"told": said("undated"), "not_archived": said("undated")}
 CASES = {
     "sound": Case("a.log", candump),
     "sound and packed": Case("a.log.gz", lambda: gzip.compress(candump())),
+    "rotated": Case("a.log.1", candump),
+    "rotated and packed": Case("a.log-20261101.gz", lambda: gzip.compress(candump())),
     "a byte order mark": Case("a.log", lambda: b"\xef\xbb\xbf" + candump()),
     "undated: candump -tz": Case("a.log", lambda: candump(RELATIVE_S, "({:010.6f})"), **UNDATED),
     "undated: .asc": Case("a.asc", lambda: asc(""), **UNDATED),

@@ -301,7 +301,7 @@ class LogReport:
         except Exception as fault:  # noqa: BLE001 # whatever a damaged file makes struct, zlib or numpy raise
             why = str(fault) or type(fault).__name__
             if self.frames == 0:
-                raise LogUnreadableError(f"{self.path}: cannot be read as {kind}: {why}") from None
+                raise LogUnreadableError(f"{self.path}: cannot be read as {kind}: {why}: is it whole?") from None
             self.ended_early = why if isinstance(fault, EOFError | OSError) else f"the file is damaged: {why}"
 
     def require_frames(self) -> None:

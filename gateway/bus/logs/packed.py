@@ -3,6 +3,7 @@
 import codecs
 import io
 import lzma
+import re
 import shutil
 import sys
 import tempfile
@@ -145,9 +146,9 @@ def is_packed(stream: BinaryIO) -> bool:
 
 
 def unpacked_suffix(path: Path) -> str:
-    """Lower-case suffix of a file's kind, without that of its packing."""
+    """Lower-case suffix of a file's kind, without that of its packing and the number or date that logrotate adds."""
     name = path.with_suffix("") if path.suffix.lower() in PACKED_SUFFIXES else path
-    return name.suffix.lower()
+    return Path(re.sub(r"[.-]\d+$", "", name.name)).suffix.lower()
 
 
 BLOCK_BYTES: Final = BUFFER_BYTES
