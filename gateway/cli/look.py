@@ -82,7 +82,7 @@ def _verdict(seen: Look, written: list[str]) -> Iterator[str]:
         yield "This cannot work yet:" if seen.lacking else once
         yield from (f"  {what}" for what in (*seen.to_mend, *seen.lacking))
     else:
-        steps = "" if seen.report.is_in_order else ", but not across the steps of its stamps that are told above"
+        steps = "" if seen.report.disorder is None else ", but not across the steps of its stamps that are told above"
         yield f"This can work{steps}."
     if not seen.lacking:
         is_shipped = len(seen.whole) == 1

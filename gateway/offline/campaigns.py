@@ -112,6 +112,7 @@ def facts_of_log(
         start_s=start_s,
         span_ns=(int(motion.t_ns.min()), int(motion.t_ns.max())) if len(motion) else None,
         damage=_damage(report),
+        disorder=report.disorder,
         silent=_silent(report.decoder, motion, signal_map) if report.decoder else {},
         mismatches=tuple((one.text, one.share, one.signals) for one in report.causes()),
         samples_sha256=_samples_sha256(whole),

@@ -38,7 +38,7 @@ class Drives:
     repeated: dict[Path, Path] = field(default_factory=dict)
     faulty: dict[Path, tuple[Finding, ...]] = field(default_factory=dict)
     findings: dict[Path, tuple[Finding, ...]] = field(default_factory=dict)
-    remarks: dict[Path, tuple[str, ...]] = field(default_factory=dict)  # of the reader
+    remarks: dict[Path, tuple[str, ...]] = field(default_factory=dict)  # of the reader, without what is a finding
 
     @property
     def driven(self) -> tuple[Driven, ...]:
@@ -66,8 +66,9 @@ def read_drives(
         except LogUnreadableError as fault:
             drives.unreadable[log] = str(fault)
             continue
-        drives.remarks[log] = tuple(report.remarks(with_decoder=False))
         facts = facts_of_log(log, motion, motion, report, signal_map)
+        remarks = report.remarks(with_decoder=False)
+        drives.remarks[log] = tuple(one for one in remarks if facts.disorder is None or facts.disorder not in one)
         found = windows_of_motion(motion, signal_map, settings)
         findings = _findings(motion, found, facts, signal_map, vehicle, settings)
         if any(one.severity is Severity.FAULT for one in findings):

@@ -173,6 +173,18 @@ def test_every_log_at_fault_is_named_and_the_rest_goes_on(folder: Path) -> None:
     assert (kinds(found)[1], kinds(found)[2]) == (["fault:same_drive"], ["fault:same_drive"])
 
 
+def test_stamps_that_step_back_are_named_before_what_follows_from_them(folder: Path) -> None:
+    """The interface was blamed, for jitter."""
+    lines = gzip.decompress(next(folder.glob("10_*/can.log.gz")).read_bytes()).splitlines(keepends=True)
+    half = len(lines) // 2
+    earlier = [b"(%d%s" % (int(line[1:11]) - 40, line[11:]) for line in lines[half:]]
+    (folder / "stepping.log").write_bytes(b"".join([*lines[:half], *earlier]))
+    run = re.sub('log = ".*"', 'log = "stepping.log"', table_of(folder, 10))
+    _, found = check(altered(folder, "stepping", (1, 8, 10), run10=run))
+    assert kinds(found)[3][0] == "warning:stamps_step"
+    assert "step back 1 time, by up to 0:00:39" in found["runs"][2]["findings"][0]["text"]
+
+
 @pytest.mark.parametrize("copied", ["unpacked.log", "exported.asc"])
 def test_a_copy_of_a_log_in_another_form_counts_once(copied: str, folder: Path) -> None:
     packed, copy = next(folder.glob("10_*/can.log.gz")), folder / copied

@@ -187,9 +187,18 @@ class LogReport:
         return self.span_ns[0] < FIRST_DATED_NS <= self.span_ns[1]
 
     @property
-    def is_in_order(self) -> bool:
-        """Whether its stamps have one zero and step back no further than buffers do."""
-        return not self.is_partly_dated and self._steps_ns[0] >= -STEP_BACK_S * NS_PER_S
+    def disorder(self) -> str | None:
+        """How its stamps step back, further than buffers do, or have several zeros; None if they do not."""
+        if self._steps_ns[0] < -STEP_BACK_S * NS_PER_S:
+            return self._steps_back()
+        return "a part of it has no date" if self.is_partly_dated else None
+
+    def _steps_back(self) -> str:
+        back_s, what = -self._steps_ns[0] / NS_PER_S, "is it several logs in one, or was the clock set?"
+        if S_PER_DAY - LATE_START_H * 3600.0 < back_s <= S_PER_DAY:
+            what = "do they count from midnight?"
+        times = counted(self.out_of_order, "time")
+        return f"its stamps step back {times}, by up to {timedelta(seconds=back_s)}: {what}"
 
     @property
     def other_identifiers(self) -> int:
@@ -261,12 +270,9 @@ class LogReport:
                 f"{self.path}: its date states no zone, it is read as UTC; if that is wrong, state time_zone in the "
                 "signal map"
             )
-        back_s, leap_s = -self._steps_ns[0] / NS_PER_S, self._steps_ns[1] / NS_PER_S
-        if back_s > STEP_BACK_S or 8 * self.out_of_order > self.wanted:
-            times, what = counted(self.out_of_order, "time"), "is it several logs in one, or was the clock set?"
-            if S_PER_DAY - LATE_START_H * 3600.0 < back_s <= S_PER_DAY:
-                what = "do they count from midnight?"
-            yield f"{self.path}: its stamps step back {times}, by up to {timedelta(seconds=back_s)}: {what}"
+        if self._steps_ns[0] < -STEP_BACK_S * NS_PER_S or 8 * self.out_of_order > self.wanted:
+            yield f"{self.path}: {self._steps_back()}"
+        leap_s = self._steps_ns[1] / NS_PER_S
         if leap_s > LEAP_S:
             yield f"{self.path}: its stamps leap forward by {timedelta(seconds=leap_s)}: a pause, or was the clock set?"
         late_h = 0.0 if self.start_ns is None else (self.first_ns - self.start_ns) / NS_PER_S / 3600.0

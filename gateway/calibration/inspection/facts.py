@@ -107,8 +107,9 @@ class LogFacts:
     ``samples_sha256`` is of its samples without their stamps: the same packed, in another format or another zone. Empty
     without a sample. ``begin_ns`` is the first stamp of the whole log, ``duration_s`` is of the whole log, ``span_ns``
     the first and last stamp of the run's piece of it, None if that piece is empty. ``unreadable`` says why nothing
-    could be read, ``damage`` what was lost of it, ``silent`` why a mapped signal has no valid sample. ``mismatches``
-    say which frames do not fit the signal map: a sentence, their share of the message, and the signals that suffer.
+    could be read, ``damage`` what was lost of it, ``disorder`` how its stamps step back, ``silent`` why a mapped signal
+    has no valid sample. ``mismatches`` say which frames do not fit the signal map: a sentence, their share of the
+    message, and the signals that suffer.
     """
 
     sha256: str = ""
@@ -117,6 +118,7 @@ class LogFacts:
     span_ns: tuple[int, int] | None = (0, 0)
     unreadable: str | None = None
     damage: str | None = None
+    disorder: str | None = None
     silent: Mapping[Signal, str] = field(default_factory=dict)
     mismatches: tuple[tuple[str, float, frozenset[Signal]], ...] = ()
     samples_sha256: str = ""

@@ -39,6 +39,8 @@ class Kind(StrEnum):
         "check that it is the log of this drive, that it was recorded on this bus, and that the whole file was copied")
     LOG_DAMAGED = ("log_damaged", _WARNING,
         "copy the log from the recorder again; the recorder must close its file before it loses power")
+    STAMPS_STEP = ("stamps_step", _WARNING,
+        "part logs that were joined, sort lines by time, or let the recorder set its clock before it begins")
     CUT_AWAY = "cut_away", _FAULT, "correct start_s and end_s; both count in seconds from the first frame of the log"
     SAME_DRIVE = "same_drive", _FAULT, "give each run its own log, or parts of a log that do not overlap"
     TOO_SHORT = ("too_short", _FAULT,

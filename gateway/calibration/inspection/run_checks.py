@@ -198,6 +198,8 @@ def _of_map(seen: _Seen) -> Iterator[Finding]:
     """Damage of the log, signals without a place in the map, and frames that do not fit it."""
     if seen.drive.log.damage:
         yield Finding.of(Kind.LOG_DAMAGED, seen.drive.log.damage)
+    if seen.drive.log.disorder:
+        yield Finding.of(Kind.STAMPS_STEP, seen.drive.log.disorder)
     if seen.streams and Signal.SPEED not in seen.streams and Signal.WHEEL_SPEED not in seen.streams:
         yield Finding.of(Kind.SIGNAL_UNMAPPED, "neither speed nor wheel_speed is in the signal map")
     absent = [signal for signal in INERTIAL if signal not in seen.streams]
