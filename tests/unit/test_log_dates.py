@@ -142,6 +142,8 @@ REFUSED = {
     "identifiers with 0x": ("a.log", "(1627274455.0125) can0 0x123#01\n" * 9, "left out, garbled: 9"),
     "Wireshark": ("a.log", b"\xd4\xc3\xb2\xa1\2\0\4\0" + bytes(99), "a capture of Wireshark"),
     "bzip2": ("a.log", b"BZh91AY&SY" + bytes(99), "packed with bzip2"),
+    "a web page": ("a.log", "<!DOCTYPE html>404", "is not what its name says, but a web page"),
+    "Git LFS": ("a.blf", "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\n", "fetch the file itself"),
     "nothing": ("a.asc", "", "is empty"),
     "a header alone": ("a.asc", "date 2023-03-10 15:06:12\n", "holds no CAN frame$"),
     "trc 1.2": ("a.trc", ";$FILEVERSION=1.2\n     1)      0.0 1  Rx  0123  2  01 02\n", "version '1.2'"),
@@ -188,6 +190,12 @@ def test_a_date_that_is_ambiguous_or_impossible_is_none(date, tmp_path):
     frames, report = read(tmp_path / "a.asc", asc(date))
     assert (frames.t_ns.tolist(), report.is_dated) == ([500_000_000], False)
     assert any(f"its date '{date}' cannot be " in remark for remark in report.remarks())
+
+
+def test_of_many_bad_dates_a_few_are_told(tmp_path):
+    lines = [f"date foo {number}\n{ASC_FRAME}" for number in range(1000)]
+    frames, report = read(tmp_path / "a.asc", asc("2023-03-10 15:06:12", *lines))
+    assert (len(frames), len(list(report.remarks()))) == (1000, 9)  # with the zone
 
 
 def test_an_impossible_date_of_a_block_leaves_that_of_the_header(tmp_path):

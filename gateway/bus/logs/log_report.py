@@ -26,6 +26,7 @@ NAMED_CHANNELS: Final = 8  # chosen: likewise
 KEPT_CHANNELS: Final = 32  # chosen: in memory; damaged lines name any number
 CHUNK_FRAMES: Final = 32_768  # chosen: given out at once: large enough that the decoder's own steps cost little
 SHOWN_CHARS: Final = 60  # chosen: of a line that cannot be read
+MOST_NOTES: Final = 8  # chosen: of the dates in a log
 AS_CANDUMP: Final = "; candump logs are recorded with candump -L"
 JUDGED_FRAMES: Final = 1000  # chosen: least number whose stamps are judged
 JUDGED_SECONDS: Final = 3.0  # chosen: likewise, before the end of the log is reached
@@ -155,7 +156,7 @@ class LogReport:
         return start_ns
 
     def _note(self, text: str) -> None:
-        if text not in self.notes:
+        if text not in self.notes and len(self.notes) < MOST_NOTES:
             self.notes.append(text)
 
     def count_wanted(self, t_ns: I64) -> None:

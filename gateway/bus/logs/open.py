@@ -33,6 +33,8 @@ OTHER_KINDS: Final = (
     (rb"\xff\xfe|\xfe\xff", "UTF-16; save it as UTF-8"),
     (rb"\x89PNG|\xff\xd8\xff|GIF8", "a picture"),
     (rb"%PDF", "a PDF document"),
+    (rb"<!doctype|<!DOCTYPE|<html|<\?xml", "a web page, or XML"),
+    (rb"version https://git-lfs", "a pointer of Git LFS; fetch the file itself"),
     (rb"PK\x03\x04", "a ZIP archive; unpack it"),
     (rb"BZh", "packed with bzip2; unpack it"),
     (rb"7z\xbc\xaf", "a 7z archive; unpack it"),
