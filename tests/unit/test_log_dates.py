@@ -204,6 +204,16 @@ def test_an_impossible_date_of_a_block_leaves_that_of_the_header(tmp_path):
     assert read(tmp_path / "a.asc", text)[0].t_ns.tolist() == [round(NOON.timestamp() * 1e9) + 500_000_000]
 
 
+@pytest.mark.parametrize("stamps", ["absolute", "relative"])
+@pytest.mark.parametrize("days", [(10, 11), (11, 10)])
+def test_each_of_several_headers_dates_the_frames_behind_it(days, stamps, tmp_path):
+    """Relative stamps went on from the log before, and the first frame was told to be late."""
+    logs = (asc(f"2023-03-{day} 15:06:12", ASC_FRAME, base=f"base hex  timestamps {stamps}\n") for day in days)
+    frames, report = read(tmp_path / "a.asc", "".join(logs))
+    assert frames.t_ns.tolist() == [round(NOON.replace(day=day).timestamp() * 1e9) + 500_000_000 for day in days]
+    assert not any("comes" in remark for remark in report.remarks())
+
+
 @pytest.mark.parametrize(("day", "is_told"), [("Oct 25", True), ("Mar 29", True), ("Oct 24", False)])
 def test_an_hour_in_which_clocks_are_set_is_told(day, is_told, tmp_path):
     _, report = read(tmp_path / "a.asc", asc(f"Sun {day} 02:30:00 2026"), BERLIN)

@@ -100,7 +100,7 @@ class LogReport:
 
     ``decoder`` is that of the frames given out, if they are decoded.
 
-    ``start_ns`` is the date of the log's header, if it has one; ``has_wall_clock`` tells that this date states no zone.
+    ``start_ns`` is the date of the log's header, the latest of several; ``has_wall_clock``: it states no zone.
     """
 
     path: Path
@@ -152,7 +152,8 @@ class LogReport:
             return self.start_ns or 0
         if is_doubled(date, zone):
             self._note(f"its date {told[:SHOWN_CHARS]!r} is in an hour in which clocks are set: it may be an hour off")
-        self.has_wall_clock, self.zone, self.start_ns = date.tzinfo is None, zone, start_ns
+        self.has_wall_clock, self.zone = date.tzinfo is None, zone
+        self.start_ns = max(start_ns, self.start_ns or 0)
         return start_ns
 
     def _note(self, text: str) -> None:

@@ -135,7 +135,7 @@ class _AscLog(_TextLog):
             self._state_base(told["base"].lower())
             self._is_relative = (told["stamps"] or "").lower() == "relative"
         elif date := told["date"].strip():
-            self.start_ns = self.report.begin_at(date_in(date), self.zone, date)
+            self.start_ns, self._sum_ns = self.report.begin_at(date_in(date), self.zone, date), 0
 
     def frame_in(self, line: str) -> str | None:
         is_frame, stamp = self._FRAME.match(line), self._STAMP.match(line)
