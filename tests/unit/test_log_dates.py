@@ -102,6 +102,12 @@ def test_the_stated_zone_holds_and_never_that_of_the_computer(suffix, zone, tmp_
     assert found[None] - found[BERLIN] == 3600 * 10**9
 
 
+def test_a_message_of_several_frames_is_no_lost_frame(tmp_path):
+    line = "   0.6 1  J1939TP FEE3p        6    0  0   -   Rx   d 23 A0 0F A6 60 3B D1 40 1F DE 80 25 DF\n"
+    _, report = read(tmp_path / "a.asc", asc("2023-03-10 15:06:12", ASC_FRAME, line))
+    assert (report.wanted, report.n_rejected) == (1, 0)
+
+
 @pytest.mark.parametrize("line", ["-0.5 1 123 Rx d 1 01\n", "0,5 1 123 Rx d 1 01\n", "0.5 1 Engine Rx d 1 01\n"])
 def test_frames_of_an_asc_log_that_cannot_be_read_are_counted_with_their_cause(line, tmp_path):
     _, report = read(tmp_path / "a.asc", asc("2023-03-10 15:06:12", ASC_FRAME, line, ASC_FRAME))
@@ -174,6 +180,25 @@ def test_lines_in_which_no_identifier_is_found_are_not_another_vehicles(kind, tm
     assert list(chunks) == []
     with pytest.raises(LogUnreadableError, match=said):
         report.require_frames()
+
+
+TRC_LINES = {  # a status, an error frame and a frame, as PCAN-View writes them
+    "1.0": ("     1)   17540  FFFFFFFF  4  00 00 00 08 -- -- -- -- BUSHEAVY\n", "", "     2)   17700  0100  1  2A\n"),
+    "1.1": ("     1)  17540.3  Warng  FFFFFFFF  4  00 00 00 08  BUSHEAVY\n",
+            "     2)  17541.3  Error  0008  4  00 19 08 08\n", "     3)  17700.3  Rx     0100  1  2A\n"),
+    "1.3": ("     1)  17540.300 1  Warng FFFFFFFF -  4    00 00 00 08 BUSHEAVY\n",
+            "     2)  17541.300 1  Error     0008 -  4    00 19 08 08\n", "     3)  17700.300 1  Rx  0100 -  1  2A\n"),
+    "2.1": (";$COLUMNS=N,O,T,B,I,d,R,L,D\n  1  17540.300 ST 1     - Rx -  4    00 00 00 08\n",
+            "  2  17541.300 ER 1     - Rx -  5    04 00 02 00 00\n", "  3  17700.300 DT 1  0100 Rx -  1    2A\n"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("version", TRC_LINES)
+def test_a_status_in_a_trc_is_no_lost_frame_and_an_error_frame_is_one(version, tmp_path):
+    head = "" if version == "1.0" else f";$FILEVERSION={version}\n"
+    frames, report = read(tmp_path / "a.trc", head + "".join(TRC_LINES[version]))
+    assert (frames.can_id.tolist(), report.n_rejected) == ([0x100], 0)
+    assert report.error_frames == (version != "1.0")
 
 
 @pytest.mark.parametrize("line", [";$STARTTIMEX=abc\n", ";$COLUMNS=\n", ";$COLUMNS=X\n", ";$\n" * 50])

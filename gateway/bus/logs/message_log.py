@@ -107,7 +107,7 @@ class _TextLog(ABC):
 
 class _AscLog(_TextLog):
     """Vector's text: lines of ``STAMP CHANNEL IDENTIFIER Rx d LENGTH BYTES``. The header may say that stamps count from
-    the line before.
+    the line before. J1939TP lines repeat the content of several frames.
     """
 
     reader = can.ASCReader
@@ -118,7 +118,7 @@ class _AscLog(_TextLog):
     )
     _STAMP = re.compile(r"\s*(-?\d{1,12})(?:\.(\d{1,9})\d*)?(?=\s)")
     _FRAME = re.compile(
-        r"\s*-?\d\S*\s+(?:(?:CANFD\s+\d+|\d+)\s+(?:.*\s)?(?:[RT]x|TxRq|ErrorFrame)\b|\S+\s+\S+\s+[RT]x\s+d\s)",
+        r"\s*-?\d\S*\s+(?:(?:CANFD\s+\d+|\d+)(?!\s+J1939TP)\s+(?:.*\s)?(?:[RT]x|TxRq|ErrorFrame)\b|\S+\s+\S+\s+[RT]x\s+d\s)",
         re.IGNORECASE,
     )
 
@@ -150,10 +150,13 @@ class _AscLog(_TextLog):
 
 
 class _TrcLog(_TextLog):
-    """PEAK's text. Lines of the header begin with a semicolon; the version decides the columns."""
+    """PEAK's text. Lines of the header begin with a semicolon; the version decides the columns. Some lines are no
+    frames: a change of the bus status or the error counters, or an event of the user.
+    """
 
     reader = can.TRCReader
     header_form = re.compile(";.*", re.DOTALL)
+    _OTHER = re.compile(r"\s*\d+\)?\s+[\d.]+\s+(?:\d\s+)?(?:(?P<error>ER|Error)|ST|EC|EV|Warng|FFFFFFFF)\b")
 
     def read_header(self, told: re.Match[str]) -> None:
         line = told[0]
@@ -172,7 +175,11 @@ class _TrcLog(_TextLog):
             self.start_ns = self.report.begin_at(date_in(line), self.zone, line.partition(":")[2].strip())
 
     def frame_in(self, line: str) -> str | None:
-        return line
+        other = self._OTHER.match(line)
+        if other is None:
+            return line
+        self.report.error_frames += other["error"] is not None
+        return None
 
 
 def _text_messages(log: _TextLog) -> Iterator[Found]:
