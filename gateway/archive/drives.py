@@ -44,7 +44,7 @@ class JobDrives:
                     if len(motion):
                         newest_ns = max(int(motion.t_ns.max()), newest_ns or 0)
                         estimates += self._weighed(flow, flow.scheduler.feed(motion))
-                report.require_frames()
+                report.require_dates()
             except Exception as fault:
                 raise _of_the_log(fault, one, str(fetched.path)) from fault
         self._open = (one, flow) if goes_on(newest_ns, next_ns, self._job.settings) else None

@@ -108,16 +108,11 @@ def survey(log: LogFile) -> SurveyedLog:
 def _first_ns(log: LogFile, path: Path) -> int:
     """The time of the first frame. Raises LogUnreadableError without one that has a date."""
     chunks, report = open_whole_log(path, zone=log.zone)
-    first_ns = next((int(chunk.t_ns[0]) for chunk in chunks if len(chunk)), None)
-    if first_ns is None or not report.is_dated:
+    first_ns = next((int(chunk.t_ns[0]) for chunk in chunks if len(chunk)), 0)
+    if not report.is_dated:
         for _ in chunks:
             pass  # to its end: other faults of its stamps are told first
-        report.require_frames()
-        noted = "".join(f"; {note}" for note in report.notes)
-        raise LogUnreadableError(
-            f"{log.name}: has no date{noted}: nothing tells which month and calibration it belongs to; "
-            "weigh it with springscale estimate"
-        )
+        report.require_dates()
     return first_ns
 
 

@@ -12,6 +12,7 @@ import can
 from gateway.bus.frames import Speed, message_of, take
 from gateway.bus.listen import system_reason
 from gateway.bus.logs import LogReport, open_whole_log
+from gateway.bus.logs.log_report import LEAP_S, STEP_BACK_S
 from gateway.bus.receiver import require_usable_interface
 from gateway.errors import BusError
 from gateway.records import Frames
@@ -80,14 +81,18 @@ def replay_frames(
     on_progress: OnProgress | None = None,
     stop: threading.Event | None = None,
 ) -> int:
-    """Send chunks of frames paced by their stamps; returns the number sent. A step back in time does not wait."""
+    """Send chunks of frames paced by their stamps; returns the number sent.
+
+    Where a clock was set or another log begins, the next frame follows at once.
+    """
     stop = stop or threading.Event()
-    n_sent = 0
-    first_ns: int | None = None
+    n_sent, recorded_s = 0, 0.0
+    last_ns: int | None = None
     begun_s = time.monotonic()
     for piece in _pieces(chunks):
-        first_ns = int(piece.t_ns[0]) if first_ns is None else first_ns
-        recorded_s = (int(piece.t_ns[0]) - first_ns) / NS_PER_S
+        step_s = 0.0 if last_ns is None else (int(piece.t_ns[0]) - last_ns) / NS_PER_S
+        recorded_s += step_s if -STEP_BACK_S <= step_s <= LEAP_S else 0.0
+        last_ns = int(piece.t_ns[0])
         due_s = begun_s if speed == "max" else begun_s + recorded_s / speed
         while not stop.is_set() and (left_s := due_s - time.monotonic()) > 0:
             stop.wait(min(left_s, LONGEST_SLEEP_S))

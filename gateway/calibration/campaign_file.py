@@ -42,9 +42,7 @@ class _Table(BaseModel):
 class RunTable(_Table):
     """[[runs]]: one drive and what is known of its load."""
 
-    log: Path = Field(
-        description="its log: candump text, .asc, .blf, .mf4, .trc or .csv, each also as .gz, .zst or .xz"
-    )
+    log: Path = Field(description="its log: candump text, .asc, .blf, .mf4 or .trc, each also as .gz, .zst or .xz")
     payload_kg: Kilograms | None = Field(
         None, description="load in addition to the empty vehicle: L; 0 for an empty run; absent: unknown"
     )

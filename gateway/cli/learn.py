@@ -1,7 +1,6 @@
 """springscale learn: ordinary drives, and what is said of their loads, to a calibration file."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 from zoneinfo import ZoneInfo
@@ -122,7 +121,7 @@ def _logs_record(drives: Drives) -> Record:
     """What became of the logs."""
     left_out = {log: [why.removeprefix(f"{log}: ")] for log, why in drives.unreadable.items()}
     left_out |= {
-        log: [f"of the same time as {first}, which counts once: of two drives, record both with their date"]
+        log: [f"of the same driving as {first}, which counts once: if it is another drive, record both with their date"]
         for log, first in drives.repeated.items()
     }
     left_out |= {
@@ -135,10 +134,14 @@ def _logs_record(drives: Drives) -> Record:
         "n_short_drives": drives.pieces.n_short,
         "short_s": rounded(drives.pieces.short_s, 1),
         "left_out": {str(log): why for log, why in left_out.items()},
-        "dates": {str(log): list(remarks) for log, remarks in drives.dates.items()},
         "findings": {
             str(log): [f"{one.severity} {one.kind}: {one.text}: {one.advice}" for one in found]
             for log, found in drives.findings.items()
+        },
+        "remarks": {
+            str(log): [one.removeprefix(f"{log}: ") for one in remarks]
+            for log, remarks in drives.remarks.items()
+            if remarks
         },
     }
 
@@ -174,7 +177,7 @@ def _logs_told(record: Record) -> Iterator[str]:
     for log, reasons in left_out.items():
         yield from (f"  {log}: left out: {why}" for why in reasons)
     logs_of: dict[str, list[str]] = {}
-    for log, texts in chain(record["dates"].items(), record["findings"].items()):
+    for log, texts in (*record["findings"].items(), *record["remarks"].items()):
         for text in texts:
             logs_of.setdefault(text, []).append(log)
     for text, logs in logs_of.items():

@@ -90,12 +90,12 @@ EXPLANATIONS: Final[Mapping[Why, Explanation]] = MappingProxyType(
         Why.TOO_SLOW: Explanation(
             Cause.DRIVE,
             "the speed was below `speed_min_mps` for too much of the window: town traffic, a queue, a yard",
-            "nothing; an open road is enough",
+            "nothing; an open road is enough. If it was one, correct the speed's unit or factor in its database",
         ),
         Why.TOO_FAST: Explanation(
             Cause.DRIVE,
             "the speed was above `speed_max_mps` for too much of the window",
-            "check the speed's unit in the signal map",
+            "correct the speed's unit or factor in its database",
         ),
         Why.SPEED_SPREAD: Explanation(
             Cause.DRIVE,

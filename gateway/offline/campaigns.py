@@ -1,5 +1,6 @@
 """A campaign's drives: read, split into identification and validation, inspected, calibrated and judged."""
 
+import hashlib
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -115,7 +116,16 @@ def facts_of_log(
         silent=_silent(report.decoder, motion, signal_map) if report.decoder else {},
         mismatches=tuple((one.text, one.share, one.signals) for one in report.causes()),
         remarks=tuple(report.remarks()),
+        samples_sha256=_samples_sha256(whole),
+        begin_ns=int(whole.t_ns.min()),
     )
+
+
+def _samples_sha256(motion: Motion) -> str:
+    digest = hashlib.sha256()
+    for signal in motion.signals:
+        digest.update(motion.of(signal)[1].tobytes())
+    return digest.hexdigest() if np.isfinite(motion.columns).any() else ""
 
 
 def _silent(decoder: Decoder, motion: Motion, signal_map: SignalMap) -> dict[Signal, str]:

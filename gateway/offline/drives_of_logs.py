@@ -35,10 +35,10 @@ class Drives:
     pieces: Pieces
     n_logs: int
     unreadable: dict[Path, str] = field(default_factory=dict)
-    dates: dict[Path, tuple[str, ...]] = field(default_factory=dict)  # what is not known of them
     repeated: dict[Path, Path] = field(default_factory=dict)
     faulty: dict[Path, tuple[Finding, ...]] = field(default_factory=dict)
     findings: dict[Path, tuple[Finding, ...]] = field(default_factory=dict)
+    remarks: dict[Path, tuple[str, ...]] = field(default_factory=dict)  # of the reader, without what is a finding
 
     @property
     def driven(self) -> tuple[Driven, ...]:
@@ -54,10 +54,11 @@ def read_drives(
     settings: BatchSettings,
     on_log: OnLog = lambda done, of: None,
 ) -> Drives:
-    """The drives of the logs, cut at the moments ``at_ns`` too. A log with a fault of a sensor teaches nothing."""
+    """The drives of the logs, cut at the moments ``at_ns`` too. A log with a fault of a sensor teaches nothing; of logs
+    of the same driving the one with most of it counts.
+    """
     drives = Drives(Pieces(()), len(logs))
-    windows: list[KeptBatch] = []
-    source: dict[int, Path] = {}
+    kept: dict[Path, _Read] = {}
     for done, log in enumerate(logs):
         on_log(done, len(logs))
         try:
@@ -65,30 +66,53 @@ def read_drives(
         except LogUnreadableError as fault:
             drives.unreadable[log] = str(fault)
             continue
-        if remarks := tuple(report.remarks_on_dates()):
-            drives.dates[log] = remarks
         facts = facts_of_log(log, motion, motion, report, signal_map)
+        remarks = report.remarks(with_decoder=False)
+        drives.remarks[log] = tuple(one for one in remarks if not one.endswith(facts.clock))
         found = windows_of_motion(motion, signal_map, settings)
-        teaching = [one.batch for one in found if can_teach(one.batch, settings)]
-        repeated = (one.batch for one in windows if any(_is_same_driving(one.batch, other) for other in teaching))
-        if (same := next(repeated, None)) is not None:
-            drives.repeated[log] = source[same.drive_start_ns]
-            continue
         findings = _findings(motion, found, facts, signal_map, vehicle, settings)
-        kept = drives.faulty if any(one.severity is Severity.FAULT for one in findings) else drives.findings
-        if findings:
-            kept[log] = findings
-        if log in drives.faulty:
+        if any(one.severity is Severity.FAULT for one in findings):
+            drives.faulty[log] = findings
             continue
-        windows += found
-        source |= {one.batch.drive_start_ns: log for one in found}
+        new = _Read(found, [one.batch for one in found if can_teach(one.batch, settings)], facts.samples_sha256)
+        same = [other for other, one in kept.items() if new.is_of_same_driving(one)]
+        if same and new.driven_s <= sum(kept[other].driven_s for other in same):
+            drives.repeated[log] = same[0]
+            continue
+        drives.repeated.update({other: log for other, first in drives.repeated.items() if first in same})
+        for other in same:
+            drives.repeated[other] = log
+            del kept[other]
+            drives.findings.pop(other, None)
+        kept[log] = new
+        if findings:
+            drives.findings[log] = findings
     on_log(len(logs), len(logs))
-    found_pieces = pieces(windows, at_ns, settings, lambda one: str(source[one.batch.drive_start_ns]))
-    return replace(drives, pieces=found_pieces)
+    source = {one.batch.drive_start_ns: str(log) for log, read in kept.items() for one in read.windows}
+    windows = [one for read in kept.values() for one in read.windows]
+    return replace(drives, pieces=pieces(windows, at_ns, settings, lambda one: source[one.batch.drive_start_ns]))
+
+
+@dataclass(frozen=True, slots=True)
+class _Read:
+    """The windows of a log, those that teach, and the hash of its samples."""
+
+    windows: list[KeptBatch]
+    teaching: list[Batch]
+    samples_sha256: str
+
+    @property
+    def driven_s(self) -> float:
+        return sum(one.usable_s for one in self.teaching)
+
+    def is_of_same_driving(self, other: "_Read") -> bool:
+        """Whether two logs have driving in common: copies of any name and format, a second recorder."""
+        is_copy = bool(self.samples_sha256) and self.samples_sha256 == other.samples_sha256
+        return is_copy or any(_is_same_driving(one, its) for one in self.teaching for its in other.teaching)
 
 
 def _is_same_driving(one: Batch, other: Batch) -> bool:
-    """Whether two windows are of the same driving: a log named twice, its packed copy, a second recorder.
+    """Whether two windows are of the same driving.
 
     Of times without a date only the same begin tells it: other drives begin at 0 too, but would be joined with this.
     """

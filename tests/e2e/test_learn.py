@@ -152,19 +152,35 @@ def _undated(log: bytes) -> bytes:
     return b"".join(b"(%03d%s) %s" % (int(stamp[1:11]) - first_s, stamp[11:], rest) for stamp, _, rest in lines)
 
 
+def _in_another_zone(log: bytes) -> bytes:
+    """Stamps an hour later, as of a copy whose zone was not stated."""
+    lines = [line.partition(b".") for line in log.splitlines(keepends=True)]
+    return b"".join(b"(%d%s%s" % (int(stamp[1:]) + 3600, dot, rest) for stamp, dot, rest in lines)
+
+
 @pytest.mark.parametrize(
-    ("name", "copied"), [("01.log.gz", gzip.compress), ("a.log", _second_half), ("01.log", lambda log: log)]
+    ("name", "copied"),
+    [
+        ("01.log.gz", gzip.compress),
+        ("a.log", _second_half),
+        ("01.log", lambda log: log),
+        ("b.log", _in_another_zone),
+        ("c.log", _undated),
+    ],
 )
+@pytest.mark.parametrize("is_first", [False, True])
 def test_driving_that_two_logs_have_teaches_once(
-    name: str, copied: Callable[[bytes], bytes], drives: Path, tmp_path: Path
+    name: str, copied: Callable[[bytes], bytes], is_first: bool, drives: Path, tmp_path: Path
 ) -> None:
-    """It counted twice, and intervals were narrower than they may be."""
+    """It counted twice, and intervals were narrower than they may be. The longer log counts, whatever their order."""
     shutil.copy(drives / "01.log", tmp_path)
     (tmp_path / name).write_bytes(copied((drives / "01.log").read_bytes()))
-    logs = (tmp_path / "01.log", tmp_path / name, drives / "02.log")
-    said = printed("learn", *logs, "--vehicle", drives / "van.toml", "--signals", SIGNALS, "--dry-run", *WINDOW)
+    logs = [tmp_path / "01.log", tmp_path / name][:: -1 if is_first else 1]
+    asked = ("--vehicle", drives / "van.toml", "--signals", SIGNALS, "--dry-run", *WINDOW)
+    said = printed("learn", *logs, drives / "02.log", *asked)
     assert "3 logs: 2 drives" in said
-    assert f"{name}: left out: of the same time as {tmp_path / '01.log'}, which counts once" in said
+    other, one = (logs[1], logs[0]) if copied is not _second_half else (tmp_path / name, tmp_path / "01.log")
+    assert f"{other}: left out: of the same driving as {one}, which counts once" in said
 
 
 def test_drives_without_a_date_are_not_taken_for_one(drives: Path, tmp_path: Path) -> None:
@@ -173,7 +189,7 @@ def test_drives_without_a_date_are_not_taken_for_one(drives: Path, tmp_path: Pat
         log.write_bytes(_undated((drives / log.name).read_bytes()))
     said = printed("learn", *logs, "--vehicle", drives / "van.toml", "--signals", SIGNALS, "--dry-run", *WINDOW)
     assert "2 logs: 1 drive with" in said
-    assert f"{logs[1]}: left out: of the same time as {logs[0]}" in said
+    assert f"{logs[1]}: left out: of the same driving as {logs[0]}" in said
     assert f"{logs[0]} and 1 other log: has no date" in said
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import can
 import pytest
 from click.testing import Result
 from support.calibrated import calibration_file
@@ -181,12 +182,26 @@ def test_a_log_whose_clock_was_set_is_named(folder: Path, tmp_path: Path) -> Non
     run4 = re.sub(r'log = ".*"', 'log = "set.log"', table_of(folder, 4))
     campaign, told = altered(folder, "set", run4=run4), "its stamps step back 1 time, by up to 0:00:39."
     _, found = check(campaign)
-    assert "warning:log_clock" in kinds(found)[2]
+    assert kinds(found)[2][0] == "warning:log_clock"  # before what follows from it
     assert told in json.dumps(found)
     assert all("log_clock" not in one for number, findings in kinds(found).items() if number != 2 for one in findings)
     (tmp_path / "van.json").write_text(calibration_file().to_json(), encoding="utf-8")
     judged = called("evaluate", campaign, "--calibration", tmp_path / "van.json", *WINDOW)
     assert f"set.log: {told}" in judged.stderr
+
+
+@pytest.mark.parametrize("copied", ["unpacked.log", "exported.asc"])
+def test_a_copy_of_a_log_in_another_form_counts_once(copied: str, folder: Path) -> None:
+    packed, copy = next(folder.glob("10_*/can.log.gz")), folder / copied
+    if copied.endswith(".log"):
+        copy.write_bytes(gzip.decompress(packed.read_bytes()))
+    else:
+        with can.LogReader(packed) as frames, can.ASCWriter(copy) as writer:
+            for frame in frames:
+                writer.on_message_received(frame)
+    again = re.sub('log = ".*"', f'log = "{copied}"', table_of(folder, 10))
+    exit_code, found = check(altered(folder, "copied", (1, 10, 9), run9=again))
+    assert (exit_code, kinds(found)[2], kinds(found)[3]) == (0, [], ["fault:same_drive"])
 
 
 def test_faults_that_leave_one_load_of_several_are_refused(folder: Path) -> None:

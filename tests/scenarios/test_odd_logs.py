@@ -65,6 +65,7 @@ CAUSES = {  # what a message may name, and how it does
     "silence": "silent",
     "road": "road too smooth",
     "reader": "cannot be read as",
+    "reverse": "in reverse order of time",
 }
 
 
@@ -167,6 +168,8 @@ UNDATED = {"told": said("undated"), "not_archived": said("undated")}
 CASES = {
     "sound": Case("a.log", candump),
     "sound and packed": Case("a.log.gz", lambda: gzip.compress(candump())),
+    "rotated": Case("a.log.1", candump),
+    "rotated and packed": Case("a.log-20261101.gz", lambda: gzip.compress(candump())),
     "a byte order mark": Case("a.log", lambda: b"\xef\xbb\xbf" + candump()),
     "undated: candump -tz": Case("a.log", lambda: candump(RELATIVE_S, "({:010.6f})"), **UNDATED),
     "undated: .asc": Case("a.asc", lambda: asc(""), **UNDATED),
@@ -203,6 +206,9 @@ CASES = {
         "a.log", lambda: candump().replace(b"(", b"Nov 01 00:00:00 box candump: ("), refused=said("prefix")
     ),
     "symbolic .asc": Case("a.asc", lambda: asc(ZONED, name="IMU_{:X}"), refused=said("names")),
+    "turned over": Case(
+        "a.log", lambda: b"".join(candump().splitlines(keepends=True)[::-1]), refused=said("reverse")
+    ),
     ".trc 3.0": Case("a.trc", lambda: trc("3.0"), refused=said("version")),
 }  # fmt: skip
 
@@ -336,25 +342,34 @@ def test_record(case: Case, folder: Path, monkeypatch: pytest.MonkeyPatch) -> No
     assert causes_in(" ".join(report.remarks())) <= {"undated"}
 
 
-SET = {  # the first stamp, by how much the clock is set midway, and what is told
-    "back": (ABSOLUTE_S[0], -40.0, "its stamps step back 1 time, by up to 0:00:40"),
-    "forward": (ABSOLUTE_S[0], 86_400.0, "its stamps leap forward by 1 day, 0:00:00"),
-    "from 1970": (0.0, ABSOLUTE_S[0], "its stamps leap forward by 20758 days, 0:00:00"),
-}
+ASKED = "was the clock set?"
+SET = {  # the first stamp, by how much the clock is set midway, what is told, and of look and the archive
+    "back": (ABSOLUTE_S[0], -40.0, ("its stamps step back 1 time, by up to 0:00:40", ASKED), False, True),
+    "forward": (ABSOLUTE_S[0], 86_400.0, ("its stamps leap forward by 1 day, 0:00:00", ASKED), True, True),
+    "from 1970": (
+        0.0, ABSOLUTE_S[0], ("its stamps leap forward by 20758 days, 0:00:00", "a part of it has no date"), False, False
+    ),
+    "to 1970": (
+        ABSOLUTE_S[0], -ABSOLUTE_S[0], ("its stamps step back 1 time", "a part of it has no date"), False, False
+    ),
+    "at midnight": (86_389.5, -86_400.0, ("its stamps step back 1 time", "do they count from midnight?"), False, False),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("how", SET)
 def test_a_clock_that_was_set_while_recording(how: str, folder: Path) -> None:
-    """It is told, and the years between the stamps cost no memory."""
-    first_s, set_by_s, told = SET[how]
+    """It is told, no batch gets a date of 1970 in the archive, and the years between the stamps cost no memory."""
+    first_s, set_by_s, told, is_in_order, is_archived = SET[how]
     stamps_s = first_s + RELATIVE_S
     stamps_s[N // 2 :] += set_by_s
     log = folder / "van-1" / "a.log"
     log.write_bytes(candump(stamps_s))
-    for command in (("look", log), ("estimate", log, "--config", folder / "springscale.toml")):
-        said_of_it = all_said(called(*command))
-        assert told in said_of_it
-        assert "was the clock set?" in said_of_it
+    seen = called("look", log)
+    for done in (seen, called("estimate", log, "--config", folder / "springscale.toml")):
+        assert all(each in all_said(done) for each in told)
+    assert ("This can work." in seen.output, "not across the steps" in seen.output) == (is_in_order, not is_in_order)
+    done = called("reprocess", folder, "--output", folder / "out")
+    assert (done.exit_code == 0, "no date" in all_said(done)) == (is_archived, not is_archived)
 
 
 def test_another_vehicles_map(folder: Path) -> None:

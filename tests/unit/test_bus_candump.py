@@ -200,7 +200,7 @@ def test_the_report_tells_all_to_machines(read):
     assert (told["lines"], told["frames"], told["wanted"]) == (2, 2, 1)
 
 
-@pytest.mark.parametrize(("start", "kind"), [(b"\x89PNG\r\n\x1a\n", "a PNG image"), (b"LOGG", "a BLF log")])
+@pytest.mark.parametrize(("start", "kind"), [(b"\x89PNG\r\n\x1a\n", "a picture"), (b"LOGG", "a BLF log")])
 def test_another_kind_of_file_named_as_a_log_is_none(start, kind, tmp_path):
     path = tmp_path / "a.log"
     path.write_bytes(start + bytes(range(256)) * 40)
@@ -238,6 +238,12 @@ def test_a_cut_log_gives_what_was_readable_and_says_so(kind, share, read):
     frames, report = read(packed[: int(share * len(packed))])
     assert share * 40_000 - 8000 < len(frames) <= 40_000
     assert report.ended_early == f"the {kind} stream is cut off"
+
+
+@pytest.mark.parametrize("kind", PACK)
+def test_a_log_behind_a_packed_one_is_not_lost_in_silence(kind, read):
+    frames, report = read(PACK[kind](GOOD) + GOOD)
+    assert (len(frames), report.ended_early) == (1, f"something that is not {kind} follows the packed log")
 
 
 @pytest.mark.parametrize("kind", PACK)

@@ -94,5 +94,5 @@ def test_a_fit_that_cannot_begin_loses_no_window(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(bench.worker, "start", refuse)
     bench.turn()
     told = json.loads(bench.learner.learnt.state())
-    assert "nothing can be learnt: no space left" in told["fault"]
+    assert "; nothing can be learnt: no space left; weighing goes on" in f"; {told['fault']}"
     assert told["n_windows_lost"] == 0

@@ -261,6 +261,20 @@ def test_obstacles_are_reported(frames: Frames, dbc: str, lacking: list[str], tm
     assert "This cannot work yet:\n  " + "\n  ".join(lacking) in run(tmp_path / "drive.log")
 
 
+@pytest.mark.parametrize(
+    ("unit_and_factor", "kmh"),
+    [('(0.01,0) [0|0] "m/s"', 246), ('(0.002,0) [0|0] "km/h"', 14), ('(1,0) [0|0] "km/h"', 6840)],
+)
+def test_a_speed_at_which_nothing_is_weighed_is_doubted(unit_and_factor: str, kmh: int, tmp_path: Path) -> None:
+    (tmp_path / "box.dbc").write_text(DBC.replace('(0.01,0) [0|0] "km/h"', unit_and_factor))
+    write_candump(box_on_its_side(), "can3", tmp_path / "drive.log")
+    doubt = f"up to {kmh} km/h: if it drove otherwise, correct unit or factor of the speed in the database"
+    assert seen(tmp_path / "drive.log", "--output", tmp_path / "signals.toml")["to_mend"] == [
+        f"GPS.Speed reads {doubt}"
+    ]
+    assert f"[signals.speed] # CHECK: {doubt}" in (tmp_path / "signals.toml").read_text()
+
+
 def test_a_database_of_another_device_is_no_certainty(tmp_path: Path) -> None:
     """The shipped reference layout with its valid flags down: who knows whose frames these are?"""
     drive = bus_drive(30.0, seed=3)

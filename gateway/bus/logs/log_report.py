@@ -11,14 +11,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from gateway.bus.frames import gathered
-from gateway.bus.logs.wall_clock import ns_since_1970
+from gateway.bus.frames import LAST_SECOND, gathered
+from gateway.bus.logs.wall_clock import is_doubled, ns_since_1970
 from gateway.bus.signals import Decoder
 from gateway.bus.signals.decode import TELLING_SHARE, Remark
 from gateway.bus.signals.mapping import IdFilter
 from gateway.errors import LogUnreadableError
 from gateway.records import FIRST_DATED_NS, I64, U32, Bool, Frames, iso_utc
-from gateway.units import NS_PER_S
+from gateway.units import NS_PER_S, S_PER_DAY
 from gateway.words import counted
 
 KEPT_LINE_NUMBERS: Final = 5  # chosen: what a person looks at
@@ -26,7 +26,8 @@ NAMED_CHANNELS: Final = 8  # chosen: likewise
 KEPT_CHANNELS: Final = 32  # chosen: in memory; damaged lines name any number
 CHUNK_FRAMES: Final = 32_768  # chosen: given out at once: large enough that the decoder's own steps cost little
 SHOWN_CHARS: Final = 60  # chosen: of a line that cannot be read
-AS_CANDUMP: Final = "candump logs are recorded with candump -L"
+MOST_NOTES: Final = 8  # chosen: of the dates in a log
+AS_CANDUMP: Final = "; candump logs are recorded with candump -L"
 JUDGED_FRAMES: Final = 1000  # chosen: least number whose stamps are judged
 JUDGED_SECONDS: Final = 3.0  # chosen: likewise, before the end of the log is reached
 WHOLE_PER_S: Final = 10.0  # chosen: more frames a second all on whole seconds are no coincidence
@@ -57,15 +58,16 @@ _KNOWN_LINES: Final = (
     (r"\(\d{4}-\d\d-\d\d", "stamps are dates (candump -tA): record with candump -L alone"),
     (r"\(-?\d+,\d+\)|(\d+\)\s+)?-?\d+,\d+\s", "stamps have a decimal comma: write a point"),
     (r"\(-|\s*-\d", "the stamp is negative"),
-    (r"\(\d{9,10}\)", "stamps are whole seconds: has a tool cut their fractions off?"),
-    (r"\(\d{11,}", "stamps are not seconds since 1970, but perhaps a fraction of it such as milliseconds"),
+    (r"\(\d{1,10}\)", "stamps are whole seconds: has a tool cut their fractions off?"),
     (r".*\xa0", "its spaces are no-break spaces: replace them"),
     (r"\S+ \S+ 0x", "identifiers begin with 0x: cut that off"),
-    (r"\(?\d+(\.\d+)?\)?\s+\S+\s+[0-9A-F]{3,8}\s+\[\d+\]|\w+\s+[0-9A-F]{3,8}\s+\[\d+\]",
+    (r"(\(?\d+(\.\d+)?\)?\s+)?\S+\s+([RT]X\s+\S\s+\S\s+)?[0-9A-F]{3,8}\s+\[\d+\]",
      "this is candump's output for the screen: record with candump -L"),
     (r"\S.*\(\d+\.\d+\) \S+ [0-9A-F]{3,8}#", "something is written before the stamp, as in a system's log: cut it off"),
-    (r"date \S|;|\d+\)\s+\d", "this is the text of an .asc or a .trc log: name it so"),
+    (r"[^(]*#", "no stamp in parentheses stands before the frame"),
     (r"[^,;]+([,;][^,;]*){3,}", "this is a table: record with candump -L"),
+    (r"\(?\d{11,}", "stamps are not seconds since 1970, but perhaps a fraction of it such as milliseconds"),
+    (r"\d+\.\d+\s+[A-Z]\S*\s+[0-9A-F]+x?\s+[RT]x\b", "channels have names: export the log with numbers"),
     (r"\d+\.\d+\s+\S+\s+\w+\s+[RT]x\b", "messages have names instead of identifiers: export the log with numbers"),
 )  # fmt: skip
 """Lines that other tools and settings write, and what to do: the first that fits is told."""
@@ -79,11 +81,10 @@ class RejectedLines:
     first_lines: list[int] = field(default_factory=list)
     text: str = ""
 
-    def told(self, reason: LogReject, path: Path) -> str:
+    def told(self, reason: LogReject) -> str:
         """ "left out, bad time: 9, first in line 1: stamps have a decimal comma: write a point: '(1,5) can0'" """
         where = f", first in line {self.first_lines[0]}" if self.first_lines else ""
-        fitting = (what for form, what in _KNOWN_LINES if re.match(form, self.text, re.IGNORECASE))
-        known = next((what for what in fitting if not set(path.suffixes) & set(what.split())), None)
+        known = next((what for form, what in _KNOWN_LINES if re.match(form, self.text, re.IGNORECASE)), None)
         what = (f": {known}" if known else "") + (f": {self.text[:SHOWN_CHARS]!r}" if self.text else "")
         return f"left out, {str(reason).replace('_', ' ')}: {self.count}{where}{what}"
 
@@ -99,7 +100,7 @@ class LogReport:
 
     ``decoder`` is that of the frames given out, if they are decoded.
 
-    ``start_ns`` is the date of the log's header, if it has one; ``has_wall_clock`` tells that this date states no zone.
+    ``start_ns`` is the date of the log's header, the latest of several; ``has_wall_clock``: it states no zone.
     """
 
     path: Path
@@ -145,13 +146,19 @@ class LogReport:
 
     def begin_at(self, date: datetime | None, zone: tzinfo | None, told: str) -> int:
         """Take the date of the header, which says ``told``; nanoseconds since 1970, 0 without one."""
-        if date is None:
-            note = f"its date {told[:SHOWN_CHARS]!r} cannot be read"
-            self.notes += [] if note in self.notes else [note]
+        start_ns = None if date is None else ns_since_1970(date, zone)
+        if date is None or start_ns is None or not FIRST_DATED_NS <= start_ns <= LAST_SECOND * NS_PER_S:
+            self._note(f"its date {told[:SHOWN_CHARS]!r} {'cannot be read' if date is None else 'cannot be right'}")
             return self.start_ns or 0
+        if is_doubled(date, zone):
+            self._note(f"its date {told[:SHOWN_CHARS]!r} is in an hour in which clocks are set: it may be an hour off")
         self.has_wall_clock, self.zone = date.tzinfo is None, zone
-        self.start_ns = ns_since_1970(date, zone)
-        return self.start_ns
+        self.start_ns = max(start_ns, self.start_ns or 0)
+        return start_ns
+
+    def _note(self, text: str) -> None:
+        if text not in self.notes and len(self.notes) < MOST_NOTES:
+            self.notes.append(text)
 
     def count_wanted(self, t_ns: I64) -> None:
         """Count frames that are given out, at least one, by their stamps in order of arrival."""
@@ -174,8 +181,24 @@ class LogReport:
 
     @property
     def is_dated(self) -> bool:
-        """Whether its stamps are dates; those of a log without frames are not."""
-        return self.first_ns is not None and self.first_ns >= FIRST_DATED_NS
+        """Whether all its stamps are dates; those of a log without frames are not."""
+        return self.first_ns is not None and self.span_ns[0] >= FIRST_DATED_NS
+
+    @property
+    def is_partly_dated(self) -> bool:
+        return self.span_ns[0] < FIRST_DATED_NS <= self.span_ns[1]
+
+    @property
+    def has_several_zeros(self) -> bool:
+        """Whether its stamps step back further than buffers do, or only a part of them are dates."""
+        return self._steps_ns[0] < -STEP_BACK_S * NS_PER_S or self.is_partly_dated
+
+    def _steps_back(self) -> str:
+        back_s, what = -self._steps_ns[0] / NS_PER_S, "is it several logs in one, or was the clock set?"
+        if S_PER_DAY - LATE_START_H * 3600.0 < back_s <= S_PER_DAY:
+            what = "do they count from midnight?"
+        times = counted(self.out_of_order, "time")
+        return f"its stamps step back {times}, by up to {timedelta(seconds=back_s)}: {what}"
 
     @property
     def other_identifiers(self) -> int:
@@ -208,8 +231,8 @@ class LogReport:
             "ended_early": self.ended_early,
         }
 
-    def remarks(self) -> Iterator[str]:
-        """Warnings for people, a sentence each; none if all was well."""
+    def remarks(self, *, with_decoder: bool = True) -> Iterator[str]:
+        """Warnings for people, a sentence each; none if all was well. Those of the decoder are about single signals."""
         if self.ended_early:
             yield f"{self.path}: {self.ended_early}; everything before was read"
         others = (
@@ -220,13 +243,14 @@ class LogReport:
         if told := ", ".join(counted(n, noun) + rest for n, noun, rest in others if n):
             yield f"{self.path}: left out: {told}"
         for reason, lines in self.rejects.items():
-            yield f"{self.path}: {lines.told(reason, self.path)}"
+            yield f"{self.path}: {lines.told(reason)}"
         if len(self.channels) > 1 and not self.other_channel:
             seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
             yield f"{self.path}: mapped frames are on {seen}; if these are one bus twice, name one in the map"
-        for silent in self.decoder.silent() if self.decoder is not None and self.wanted else ():
+        decoder = self.decoder if with_decoder else None
+        for silent in decoder.silent() if decoder is not None and self.wanted else ():
             yield f"{self.path}: has no frame of {silent}"
-        refused = () if self.decoder is None else self.decoder.remarks()
+        refused = () if decoder is None else decoder.remarks()
         texts = (*self.notes, *(remark.text for remark in refused), *self.remarks_on_dates(), *self.remarks_on_clock())
         yield from (f"{self.path}: {text}" for text in texts)
 
@@ -239,7 +263,7 @@ class LogReport:
         if self.first_ns is None:
             return
         if not self.is_dated:
-            yield "has no date: times count from the zero of its stamps"
+            yield from [] if self.is_partly_dated else ["has no date: times count from the zero of its stamps"]
         elif self.has_wall_clock and self.zone is None:
             yield "its date states no zone, it is read as UTC; if that is wrong, state time_zone in the signal map"
 
@@ -247,10 +271,11 @@ class LogReport:
         """Where its stamps do not run as a clock does."""
         if self.first_ns is None:
             return
-        back_s, leap_s = -self._steps_ns[0] / NS_PER_S, self._steps_ns[1] / NS_PER_S
-        if back_s > STEP_BACK_S or 8 * self.out_of_order > self.wanted:
-            times, what = counted(self.out_of_order, "time"), "is it several logs in one, or was the clock set?"
-            yield f"its stamps step back {times}, by up to {timedelta(seconds=back_s)}: {what}"
+        if self.is_partly_dated:
+            yield "a part of it has no date: times count from the zero of its stamps"
+        if self._steps_ns[0] < -STEP_BACK_S * NS_PER_S or 8 * self.out_of_order > self.wanted:
+            yield self._steps_back()
+        leap_s = self._steps_ns[1] / NS_PER_S
         if leap_s > LEAP_S:
             yield f"its stamps leap forward by {timedelta(seconds=leap_s)}: a pause, or was the clock set?"
         late_h = 0.0 if self.start_ns is None else (self.first_ns - self.start_ns) / NS_PER_S / 3600.0
@@ -264,6 +289,8 @@ class LogReport:
             return None
         if self._n_whole_seconds == self.wanted > WHOLE_PER_S * self.span_s:
             return f"its {self.wanted} stamps are whole seconds: has a tool cut their fractions off?"
+        if self.out_of_order and self._steps_ns[1] == 0:
+            return "its lines are in reverse order of time: turn them over"
         if not self.is_dated and 8 * self.out_of_order > self.wanted:
             return "its stamps are the pauses between frames (candump -td): record with candump -L alone"
         if self.wanted > MOST_PER_S * self.span_s:
@@ -283,7 +310,7 @@ class LogReport:
         except Exception as fault:  # noqa: BLE001 # whatever a damaged file makes struct, zlib or numpy raise
             why = str(fault) or type(fault).__name__
             if self.frames == 0:
-                raise LogUnreadableError(f"{self.path}: cannot be read as {kind}: {why}") from None
+                raise LogUnreadableError(f"{self.path}: cannot be read as {kind}: {why}: is it whole?") from None
             self.ended_early = why if isinstance(fault, EOFError | OSError) else f"the file is damaged: {why}"
 
     def require_frames(self) -> None:
@@ -293,6 +320,16 @@ class LogReport:
         if (why := self._why_unusable()) is not None:
             raise LogUnreadableError(f"{self.path}: {why}")
 
+    def require_dates(self) -> None:
+        """After reading: as require_frames, and raise LogUnreadableError if a stamp is no date."""
+        self.require_frames()
+        if not self.is_dated:
+            why = "a part of it has no date" if self.is_partly_dated else "; ".join(("has no date", *self.notes))
+            raise LogUnreadableError(
+                f"{self.path}: {why}: nothing tells which month and calibration it belongs to; weigh it with "
+                "springscale estimate"
+            )
+
     def _why_unusable(self) -> str | None:
         if self.wanted:
             return self.why_no_times()
@@ -301,8 +338,8 @@ class LogReport:
             return f"the mapped frames are on {seen} only; correct channel in the signal map"
         if self.n_rejected > TELLING_SHARE * self.frames:
             reason, lines = max(self.rejects.items(), key=lambda each: each[1].count)
-            hint = "" if {".asc", ".trc"} & set(self.path.suffixes) else f"; {AS_CANDUMP}"
-            return f"holds no CAN frame that can be read; {lines.told(reason, self.path)}{hint}"
+            is_candump = not {".asc", ".trc", ".blf", ".mf4"} & set(self.path.suffixes)
+            return f"holds no CAN frame that can be read; {lines.told(reason)}{AS_CANDUMP if is_candump else ''}"
         if self.remote_frames:
             return f"of the mapped identifiers it has only remote frames ({self.remote_frames}), which carry no data"
         if self.frames:

@@ -107,7 +107,7 @@ class _TextLog(ABC):
 
 class _AscLog(_TextLog):
     """Vector's text: lines of ``STAMP CHANNEL IDENTIFIER Rx d LENGTH BYTES``. The header may say that stamps count from
-    the line before.
+    the line before. J1939TP lines repeat the content of several frames.
     """
 
     reader = can.ASCReader
@@ -117,7 +117,10 @@ class _AscLog(_TextLog):
         re.IGNORECASE,
     )
     _STAMP = re.compile(r"\s*(-?\d{1,12})(?:\.(\d{1,9})\d*)?(?=\s)")
-    _FRAME = re.compile(r"\s*-?\d\S*\s+(?:CANFD\s+\d+|\d+)\s+(?:.*\s)?(?:[RT]x|TxRq|ErrorFrame)\b", re.IGNORECASE)
+    _FRAME = re.compile(
+        r"\s*-?\d\S*\s+(?:(?:CANFD\s+\d+|\d+)(?!\s+J1939TP)\s+(?:.*\s)?(?:[RT]x|TxRq|ErrorFrame)\b|\S+\s+\S+\s+[RT]x\s+d\s)",
+        re.IGNORECASE,
+    )
 
     def __init__(self, selection: Selection) -> None:
         super().__init__(selection)
@@ -132,7 +135,7 @@ class _AscLog(_TextLog):
             self._state_base(told["base"].lower())
             self._is_relative = (told["stamps"] or "").lower() == "relative"
         elif date := told["date"].strip():
-            self.start_ns = self.report.begin_at(date_in(date), self.zone, date)
+            self.start_ns, self._sum_ns = self.report.begin_at(date_in(date), self.zone, date), 0
 
     def frame_in(self, line: str) -> str | None:
         is_frame, stamp = self._FRAME.match(line), self._STAMP.match(line)
@@ -147,16 +150,19 @@ class _AscLog(_TextLog):
 
 
 class _TrcLog(_TextLog):
-    """PEAK's text. Lines of the header begin with a semicolon; the version decides the columns."""
+    """PEAK's text. Lines of the header begin with a semicolon; the version decides the columns. Some lines are no
+    frames: a change of the bus status or the error counters, or an event of the user.
+    """
 
     reader = can.TRCReader
     header_form = re.compile(";.*", re.DOTALL)
+    _OTHER = re.compile(r"\s*\d+\)?\s+[\d.]+\s+(?:\d\s+)?(?:(?P<error>ER|Error)|ST|EC|EV|Warng|FFFFFFFF)\b")
 
     def read_header(self, told: re.Match[str]) -> None:
         line = told[0]
         name, _, stated = (part.strip() for part in line[1:].partition("="))
         if name == "$STARTTIME":
-            days = float(stated) if re.fullmatch(r"\d{1,6}(\.\d*)?", stated) else -1.0
+            days = float(stated.replace(",", ".")) if re.fullmatch(r"\d{1,6}([.,]\d*)?", stated) else -1.0
             self.start_ns = self.report.begin_at(days_since_1899(days) if days > 0 else None, self.zone, stated)
         elif name == "$FILEVERSION" and stated not in TRC_VERSIONS:
             raise LogUnreadableError(
@@ -165,11 +171,15 @@ class _TrcLog(_TextLog):
             )
         elif name in ("$FILEVERSION", "$COLUMNS"):
             self.header[name] = line
-        elif "start time:" in line.lower() and self.report.start_ns is None and (date := date_in(line)) is not None:
-            self.start_ns = self.report.begin_at(date, self.zone, line)
+        elif "start time:" in line.lower() and self.report.start_ns is None:
+            self.start_ns = self.report.begin_at(date_in(line), self.zone, line.partition(":")[2].strip())
 
     def frame_in(self, line: str) -> str | None:
-        return line
+        other = self._OTHER.match(line)
+        if other is None:
+            return line
+        self.report.error_frames += other["error"] is not None
+        return None
 
 
 def _text_messages(log: _TextLog) -> Iterator[Found]:

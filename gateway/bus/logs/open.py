@@ -1,5 +1,6 @@
 """Any log file as the wanted frames of a signal map."""
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from datetime import tzinfo
@@ -19,34 +20,36 @@ from gateway.bus.signals.mapping import CAN_FD_BYTES, EVERY_IDENTIFIER, SOURCE_A
 from gateway.errors import LogUnreadableError
 from gateway.records import EXTENDED_ID, Frames, Motion
 
+CANDUMP_SUFFIXES: Final = (".log", ".txt", ".candump", "")
 READERS: Final = {
-    **dict.fromkeys((".log", ".txt", ".candump", ""), read_candump),
+    **dict.fromkeys(CANDUMP_SUFFIXES, read_candump),
     **dict.fromkeys(MESSAGE_SUFFIXES, read_message_log),
     ".mf4": read_mf4,
 }
-TEXTS: Final = frozenset(READERS.keys() - {".blf", ".mf4"})
 UNMISTAKABLE: Final = frozenset(READERS.keys() - {".txt", ""})
 
-OTHER_KINDS: Final = {
-    b"\xff\xfe\0\0": "UTF-32; save it as UTF-8",
-    b"\xff\xfe": "UTF-16; save it as UTF-8",
-    b"\xfe\xff": "UTF-16; save it as UTF-8",
-    b"\x89PNG": "a PNG image",
-    b"\xff\xd8\xff": "a JPEG image",
-    b"GIF8": "a GIF image",
-    b"%PDF": "a PDF document",
-    b"PK\x03\x04": "a ZIP archive",
-    b"BZh": "packed with bzip2; unpack it",
-    b"7z\xbc\xaf": "a 7z archive",
-    b"\xd4\xc3\xb2\xa1": "a capture of Wireshark or tcpdump; record with candump -L",
-    b"\n\r\r\n": "a capture of Wireshark or tcpdump; record with candump -L",
-    b"SQLite format 3": "an SQLite database",
-    b"\x7fELF": "a program",
-    b"LOGG": "a BLF log; name it .blf",
-    b"MDF ": "an MDF log; name it .mf4",
-}
-"""First bytes of files of other kinds."""
-LONGEST_START: Final = max(map(len, OTHER_KINDS))
+OTHER_KINDS: Final = (
+    (rb"\xff\xfe\0\0", "UTF-32; save it as UTF-8"),
+    (rb"\xff\xfe|\xfe\xff", "UTF-16; save it as UTF-8"),
+    (rb"\x89PNG|\xff\xd8\xff|GIF8", "a picture"),
+    (rb"%PDF", "a PDF document"),
+    (rb"<!doctype|<!DOCTYPE|<html|<\?xml", "a web page, or XML"),
+    (rb"version https://git-lfs", "a pointer of Git LFS; fetch the file itself"),
+    (rb"PK\x03\x04", "a ZIP archive; unpack it"),
+    (rb"BZh", "packed with bzip2; unpack it"),
+    (rb"7z\xbc\xaf", "a 7z archive; unpack it"),
+    (rb"\x1f\x8b", "packed twice; unpack it once"),
+    (rb"\xd4\xc3\xb2\xa1|\n\r\r\n", "a capture of Wireshark or tcpdump; record with candump -L"),
+    (rb"SQLite format 3", "an SQLite database"),
+    (rb"\x7fELF", "a program"),
+    (rb"LOGG", "a BLF log; name it .blf", ".blf"),
+    (rb"MDF ", "an MDF log; name it .mf4", ".mf4"),
+    (rb"\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#", "candump's text; name it .log", *CANDUMP_SUFFIXES),
+    (rb"date[^\n]*\n\s*base\s+(?:hex|dec)\b", "the text of an ASC log; name it .asc", ".asc"),
+    (rb";\$FILEVERSION|;##", "the text of a TRC log; name it .trc", ".trc"),
+)
+"""The beginning of a file, what it is, and the suffixes that say so."""
+LONGEST_START: Final = 512  # chosen: bytes
 
 
 def is_named_as_log(path: Path | str) -> bool:
@@ -79,6 +82,8 @@ def _open(
         raise LogUnreadableError(f"{path}: is a folder, not a log file")
     if not path.exists():
         raise LogUnreadableError(f"{path}: no such file")
+    if not path.is_file():
+        raise LogUnreadableError(f"{path}: is a pipe or a device: write a file first")
     if suffix not in READERS:
         known, packed = " ".join(filter(None, READERS)), ", ".join(PACKED_SUFFIXES)
         raise LogUnreadableError(
@@ -86,8 +91,7 @@ def _open(
         )
     if not path.stat().st_size:
         raise LogUnreadableError(f"{path}: is empty")
-    if suffix in TEXTS:
-        _require_no_other_kind(path)
+    _require_no_other_kind(path, suffix)
     selection = Selection(LogReport(path), filters, channel, width, zone)
     return _compared(READERS[suffix], selection), selection.report
 
@@ -122,13 +126,13 @@ def motion_of_log(path: Path | str, signal_map: SignalMap) -> tuple[Iterator[Mot
     return map(report.decoder.decode, chunks), report
 
 
-def _require_no_other_kind(path: Path) -> None:
-    """Text may be damaged; a file that begins like another kind never was a text log."""
+def _require_no_other_kind(path: Path, suffix: str) -> None:
+    """A log may be damaged; a file that begins like another kind never was what its name says."""
     try:
         with open_log_file(path) as stream:
             start = stream.read(LONGEST_START)
     except (OSError, EOFError, LogUnreadableError):
         return  # the reader says why it cannot be read
-    for first, kind in OTHER_KINDS.items():
-        if start.startswith(first):
-            raise LogUnreadableError(f"{path}: is {kind}, not the text that its name says")
+    for form, kind, *suffixes in OTHER_KINDS:
+        if suffix not in suffixes and re.match(rb"(?:\xef\xbb\xbf)?\s*(?:" + form + rb")", start):
+            raise LogUnreadableError(f"{path}: is not what its name says, but {kind}")

@@ -3,6 +3,7 @@
 import codecs
 import io
 import lzma
+import re
 import shutil
 import sys
 import tempfile
@@ -100,11 +101,13 @@ class InflatedStream(io.RawIOBase):
         super().close()
 
     def _next_member(self) -> bool:
-        """Whether another member follows; zeros and other bytes after the last one are padding."""
+        """Whether another member follows; zeros after the last one are padding. Raises OSError for other bytes."""
         self._packed = self._inflater.unused_data
         if len(self._packed) < _LONGEST_MAGIC:
             self._packed += self._file.read(PACKED_BYTES)
         if not self._packed.startswith(self._packing.magics):
+            if self._packed.strip(b"\0"):
+                raise OSError(f"something that is not {self._packing.name} follows the packed log")
             return False
         self._inflater = self._packing.new_inflater()
         return True
@@ -143,9 +146,9 @@ def is_packed(stream: BinaryIO) -> bool:
 
 
 def unpacked_suffix(path: Path) -> str:
-    """Lower-case suffix of a file's kind, without that of its packing."""
+    """Lower-case suffix of a file's kind, without that of its packing and the number or date that logrotate adds."""
     name = path.with_suffix("") if path.suffix.lower() in PACKED_SUFFIXES else path
-    return name.suffix.lower()
+    return Path(re.sub(r"[.-]\d+$", "", name.name)).suffix.lower()
 
 
 BLOCK_BYTES: Final = BUFFER_BYTES

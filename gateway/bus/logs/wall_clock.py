@@ -1,7 +1,7 @@
 """Dates in the headers of logs, as recorders write them in many languages, and the zone in which they hold."""
 
 import re
-from datetime import UTC, datetime, timedelta, tzinfo
+from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from typing import Final
 
 LONGEST_DATE: Final = 200  # chosen: characters of a line that states one
@@ -17,42 +17,50 @@ _MONTH_OF: Final = {name: number for number, names in enumerate(_MONTHS, 1) for 
 _CHINESE: Final = ["一", "二", "三", "四", "五", "六", "七", "八", "九", "十", "十一", "十二"]
 _AM, _PM = ("am", "a.m.", "vorm.", "上午", "午前", "오전"), ("pm", "p.m.", "nachm.", "下午", "午後", "오후")
 
-_TIME: Final = r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,](?P<fraction>\d{1,9}))?)?"
+_TIME: Final = r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,](?P<fraction>\d{1,9})[.\d]*)?)?"
 _HALF: Final = "|".join(map(re.escape, (*_AM, *_PM)))
-_BY_NAME: Final = re.compile(
-    rf"(?P<month>[^\W_]+)\.?\s+(?P<day>\d{{1,2}})\s+(?:(?P<before>{_HALF})\s*)?{_TIME}"
-    rf"(?:\s*(?P<half>{_HALF}))?\s+(?P<year>\d{{4}})\s*$",
-    re.IGNORECASE,
+_BEHIND: Final = rf"(?:\s*(?P<half>{_HALF}))?(?:\s*(?P<zone>Z|UTC|GMT|[+-]\d{{2}}(?::?\d{{2}})?))?"
+_FORMS: Final = tuple(
+    re.compile(rf"{form}\s*$", re.IGNORECASE)
+    for form in (
+        rf"(?P<month>[^\W_]+)\.?\s+(?P<day>\d{{1,2}})\s+(?:(?P<before>{_HALF})\s*)?{_TIME}"
+        rf"(?:\s*(?P<half>{_HALF}))?\s+(?P<year>\d{{4}})",
+        rf"(?P<year>\d{{4}})-(?P<month>\d{{2}})-(?P<day>\d{{2}})[T\s]{_TIME}{_BEHIND}",
+        rf"(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<year>\d{{4}})\s+{_TIME}{_BEHIND}",
+    )
 )
-_ISO: Final = re.compile(
-    r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?(?:Z|[+-]\d{2}:?\d{2})?", re.ASCII
-)
-_NUMBERS: Final = re.compile(rf"(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<year>\d{{4}})\s+{_TIME}")
 
 
 def date_in(text: str) -> datetime | None:
-    """The date of a header's line; None if it has none that can be read. Aware only if the text states a zone."""
+    """The date with which a header's line ends; None if it has none that can be read to the end. Aware only if the text
+    states a zone.
+    """
     text = text[:LONGEST_DATE]
+    told = next((found.groupdict() for form in _FORMS if (found := form.search(text))), None)
+    month = None if told is None else _month(told["month"])
+    if told is None or month is None:
+        return None
+    half = (told["half"] or told.get("before") or "").lower()
+    hour = int(told["hour"])
+    if half in _PM and hour < 12:
+        hour += 12
+    elif half in _AM and hour == 12:
+        hour = 0
+    second, microsecond = int(told["second"] or 0), int((told["fraction"] or "0").ljust(6, "0")[:6])
     try:
-        if iso := _ISO.search(text):
-            return datetime.fromisoformat(iso[0].replace(",", "."))
-        found = _BY_NAME.search(text) or _NUMBERS.search(text)
-        month = None if found is None else _month(found["month"])
-        if found is None or month is None:
-            return None
-        told = found.groupdict()
-        half = (told.get("half") or told.get("before") or "").lower()
-        hour = int(told["hour"])
-        if half in _PM and hour < 12:
-            hour += 12
-        elif half in _AM and hour == 12:
-            hour = 0
-        second, microsecond = int(told["second"] or 0), int((told["fraction"] or "0").ljust(6, "0")[:6])
+        zone = _zone(told.get("zone"))
         return datetime(
-            int(told["year"]), month, int(told["day"]), hour, int(told["minute"]), second, microsecond
-        )  # of a wall clock
+            int(told["year"]), month, int(told["day"]), hour, int(told["minute"]), second, microsecond, zone
+        )
     except ValueError:  # the 31st of April, 25 o'clock
         return None
+
+
+def _zone(told: str | None) -> tzinfo | None:
+    if told is None or told[0] not in "+-":
+        return UTC if told else None
+    offset = timedelta(hours=int(told[1:3]), minutes=int(told[3:].removeprefix(":") or 0))
+    return timezone(offset if told[0] == "+" else -offset)
 
 
 def _month(told: str) -> int | None:
@@ -76,3 +84,9 @@ def ns_since_1970(date: datetime, zone: tzinfo | None) -> int:
     """Nanoseconds since 1970, UTC, to the microsecond; ``zone`` (None: UTC) holds for a date that states none."""
     aware = date if date.tzinfo is not None else date.replace(tzinfo=zone or UTC)
     return (aware - datetime(1970, 1, 1, tzinfo=UTC)) // timedelta(microseconds=1) * 1000
+
+
+def is_doubled(date: datetime, zone: tzinfo | None) -> bool:
+    """Whether clocks of the zone showed this time twice, or not at all, because they were set that day."""
+    first, second = (date.replace(tzinfo=date.tzinfo or zone or UTC, fold=fold) for fold in (0, 1))
+    return first.utcoffset() != second.utcoffset()

@@ -104,11 +104,12 @@ def _joined(streams: Sequence[Stream]) -> Stream:
 class LogFacts:
     """The result of reading a run's log.
 
-    ``duration_s`` is of the whole log, ``span_ns`` the first and last stamp of the run's piece of it, None if that
-    piece is empty. ``unreadable`` says why nothing could be read, ``damage`` what was lost of it, ``clock`` where its
-    stamps do not run as a clock does, ``silent`` why a mapped signal has no valid sample. ``mismatches`` say which
-    frames do not fit the signal map: a sentence, their share of the message, and the signals that suffer. ``remarks``
-    are all that reading says to a person.
+    ``samples_sha256`` is of its samples without their stamps: the same packed, in another format or another zone. Empty
+    without a sample. ``begin_ns`` is the first stamp of the whole log, ``duration_s`` is of the whole log, ``span_ns``
+    the first and last stamp of the run's piece of it, None if that piece is empty. ``unreadable`` says why nothing
+    could be read, ``damage`` what was lost of it, ``clock`` where its stamps do not run as a clock does, ``silent`` why
+    a mapped signal has no valid sample. ``mismatches`` say which frames do not fit the signal map: a sentence, their
+    share of the message, and the signals that suffer. ``remarks`` are all that reading says to a person.
     """
 
     sha256: str = ""
@@ -121,12 +122,21 @@ class LogFacts:
     silent: Mapping[Signal, str] = field(default_factory=dict)
     mismatches: tuple[tuple[str, float, frozenset[Signal]], ...] = ()
     remarks: tuple[str, ...] = ()
+    samples_sha256: str = ""
+    begin_ns: int = 0
 
     def is_of_same_drive(self, other: "LogFacts") -> bool:
-        """Whether both are of one log and their pieces of it overlap."""
-        if not self.sha256 or self.sha256 != other.sha256 or self.span_ns is None or other.span_ns is None:
+        """Whether both are of one log or of copies of it, and their pieces of it overlap."""
+        if not self.samples_sha256 or self.samples_sha256 != other.samples_sha256:
             return False
-        return self.span_ns[0] < other.span_ns[1] and other.span_ns[0] < self.span_ns[1]
+        (begin_ns, end_ns), (others_begin_ns, others_end_ns) = self._piece_ns, other._piece_ns
+        return begin_ns < others_end_ns and others_begin_ns < end_ns
+
+    @property
+    def _piece_ns(self) -> tuple[int, int]:
+        """Begin and end of the run's piece from the begin of its log."""
+        first_ns, last_ns = self.span_ns or (self.begin_ns, self.begin_ns)
+        return first_ns - self.begin_ns, last_ns - self.begin_ns
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,7 +40,7 @@ class Kind(StrEnum):
     LOG_DAMAGED = ("log_damaged", _WARNING,
         "copy the log from the recorder again; the recorder must close its file before it loses power")
     LOG_CLOCK = ("log_clock", _WARNING,
-        "record each drive in a log of its own, and start the recorder once its clock is right")
+        "record each drive in a log of its own, sort lines by time, or let the recorder set its clock before it begins")
     CUT_AWAY = "cut_away", _FAULT, "correct start_s and end_s; both count in seconds from the first frame of the log"
     SAME_DRIVE = "same_drive", _FAULT, "give each run its own log, or parts of a log that do not overlap"
     TOO_SHORT = ("too_short", _FAULT,

@@ -146,6 +146,8 @@ class Look:
 
     def _to_mend(self) -> Iterator[str]:
         """What suits no map as it is. J1939 devices that send the same speed are no matter."""
+        speeds = [each for each in self.found if each.reading.quantity == "speed" and not each.is_sure]
+        yield from (f"{each.name} reads {each.why}" for each in speeds)
         if self.whole:
             yield from (cause for fit in self.whole for cause in fit.causes)
             return

@@ -14,14 +14,15 @@ from typing import Final
 import numpy as np
 
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2
+from gateway.core.batch_settings import BatchSettings
 from gateway.offline.look.heard import SignalReading
 from gateway.records import Signal
 from gateway.units import STANDARD_GRAVITY_MPS2
 
 LEAST_CORRELATION: Final = 0.4  # chosen: of acceleration and change of speed
 LEAST_MOVING_S: Final = 60  # chosen: of driving for that
+SLOW_MPS, FAST_MPS = BatchSettings().speed_min_mps, BatchSettings().speed_max_mps
 MOVING_MPS: Final = 3.0  # chosen: above a receiver's noise
-FASTEST_MPS: Final = 100.0  # chosen: a higher reading is not a road vehicle's speed
 _NO_SPEED: Final = re.compile(r"accura|error|std|dev|limit|vert|max|min|set|_[xyz]$", re.IGNORECASE)
 _SPEED: Final = re.compile(r"speed|vel|sog|spd", re.IGNORECASE)
 _WORDS: Final = {"vertical": "z", "longitudinal": "x", "forward": "x", "lateral": "y", "transverse": "y"}
@@ -89,12 +90,18 @@ def _speed(readings: Sequence[SignalReading]) -> FoundRole | None:
     """Speed over ground if there is one, else of the wheels."""
     speeds = [r for r in readings if r.quantity == "speed" and len(r.x)]
     named = [r for r in speeds if _SPEED.search(r.name) and not _NO_SPEED.search(r.signal.name)]
-    able = [r for r in named if np.min(r.x) > -1.0 and np.max(r.x) < FASTEST_MPS]
+    able = [(SLOW_MPS <= np.max(r.x) <= FAST_MPS, r) for r in named if np.min(r.x) > -1.0]
     if not able:
         return None
-    best = min(able, key=lambda r: ("wheel" in r.name.lower(), "navig" not in r.name.lower(), -r.heard.rate_hz))
+    is_sure, best = min(
+        able,
+        key=lambda told: (
+            not told[0], "wheel" in told[1].name.lower(), "navig" not in told[1].name.lower(), -told[1].heard.rate_hz
+        ),
+    )  # fmt: skip
     role = Signal.WHEEL_SPEED if "wheel" in best.name.lower() else Signal.SPEED
-    return FoundRole(role, best, 1, f"up to {np.max(best.x) * 3.6:.0f} km/h")
+    doubt = "" if is_sure else ": if it drove otherwise, correct unit or factor of the speed in the database"
+    return FoundRole(role, best, 1, f"up to {np.max(best.x) * 3.6:.0f} km/h{doubt}", bool(is_sure))
 
 
 def _forward(horizontal: Sequence[SignalReading], speed: FoundRole) -> FoundRole | None:

@@ -152,12 +152,12 @@ class Learner(ThreadPart):
     def _lose(self, why: str) -> None:
         """A window is lost."""
         self.n_lost += 1
-        self._fail(why)
+        self._fail(f"drives cannot be kept to learn from: {why}")
 
     def _fail(self, why: str) -> None:
         if self._disk_fault is None:  # log it once until it works again
             log_event(Event.DRIVE_NOT_KEPT, level=logging.WARNING, fault=why)
-        self._disk_fault = f"drives cannot be kept to learn from: {why}; weighing goes on"
+        self._disk_fault = f"{why}; weighing goes on"
 
     @property
     def fault(self) -> str | None:
