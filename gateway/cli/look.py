@@ -73,6 +73,7 @@ def _fit(fit: MapFit) -> str:
     if fit.vertical_mps2 is not None:
         told += f"; its vertical axis reads {fit.vertical_mps2:+.2f} m/s2"
         told += "" if fit.has_gravity else f", where gravity is {STANDARD_GRAVITY_MPS2:+.2f}"
+    told = "; ".join((told, *(each.text for each in fit.silent)))
     return f"  {fit.name}{f' on {fit.channel}' if fit.channel else ''}: {told}"
 
 

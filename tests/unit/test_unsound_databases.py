@@ -112,6 +112,8 @@ MAPPED = {
     "a place of 400 digits": ("State : 48|", f"State : {HUGE}|", "'State' is longer than any message"),
     "an infinite offset": ("16@1- (0.001,0)", "16@1- (1,-1e999)", "'Accel' has scale .* and offset -inf"),
     "the same name twice": (OTHER, OTHER.replace("OTHER", "BOX"), "'BOX' is twice in a.dbc"),
+    "29 bits without the mark": ("BO_ 512 BOX", "BO_ 274923520 BOX", "a DBC writes one of 29 bits as 2422407168"),
+    "names of values without their end": ('"off" ;', '"off"', "'VAL_ 512 State .*' does not end with a semicolon"),
     "a wide range": (
         TAIL, f"{TAIL}SG_MUL_VAL_ 512 Accel State 0-65536;\n", "more than 65,536 multiplexer values"
     ),

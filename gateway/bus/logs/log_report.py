@@ -223,7 +223,7 @@ class LogReport:
             seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
             yield f"{self.path}: mapped frames are on {seen}; if these are one bus twice, name one in the map"
         for silent in self.decoder.silent() if self.decoder is not None and self.wanted else ():
-            yield f"{self.path}: has no frame of {silent}"
+            yield f"{self.path}: {silent.text}"
         refused = () if self.decoder is None else self.decoder.remarks()
         for note in (*self.notes, *(remark.text for remark in refused)):
             yield f"{self.path}: {note}"

@@ -15,7 +15,7 @@ from gateway.bus.frames import merge_frames
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map, shipped_map
 from gateway.bus.signals.bit_field import Coding
 from gateway.bus.signals.dbc import DatabaseMessage, Databases
-from gateway.bus.signals.decode import SAME_SPEED_SHARE, TELLING_SHARE
+from gateway.bus.signals.decode import SAME_SPEED_SHARE, TELLING_SHARE, Remark
 from gateway.bus.signals.mapping import SOURCE_ADDRESS, id_name
 from gateway.bus.signals.signal_map import FEWEST_COUNTER_BITS, MOST_COUNTER_BITS, shipped_databases, shipped_maps
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE
@@ -36,8 +36,9 @@ FIX_3D: Final = 3  # usual code of a three-dimensional GNSS fix
 
 @dataclass(frozen=True, slots=True)
 class MapFit:
-    """A shipped map on one channel: the signals found and missing, the median of its vertical axis, and
-    which frames do not fit it. It fits if both inertial signals come, and gravity is on the mapped axis.
+    """A shipped map on one channel: the signals found and missing, the median of its vertical axis, which frames do
+    not fit it, and signals of which no frame counts. It fits if both inertial signals come, and gravity is on the
+    mapped axis.
     """
 
     name: str
@@ -46,6 +47,7 @@ class MapFit:
     missing: list[Signal]
     vertical_mps2: float | None
     causes: list[str]
+    silent: list[Remark]
 
     @property
     def has_gravity(self) -> bool:
@@ -71,7 +73,8 @@ def fits_of(heard: Sequence[Heard]) -> list[MapFit]:
             missing = [signal for signal in motion.signals if signal not in found and signal not in ASIDE]
             vertical = motion.of(Signal.VERTICAL_ACCELERATION)[1]
             vertical_mps2 = round(float(np.median(vertical)), 3) if len(vertical) else None
-            fits.append(MapFit(name, channel, found, missing, vertical_mps2, [each.text for each in decoder.causes()]))
+            causes, silent = decoder.causes(), [each for each in decoder.silent() if each.share]
+            fits.append(MapFit(name, channel, found, missing, vertical_mps2, [one.text for one in causes], silent))
     return sorted((fit for fit in fits if fit.found), key=lambda fit: (not fit.fits, len(fit.missing), fit.name))
 
 
@@ -162,7 +165,8 @@ class Look:
 
     def _lacking(self) -> Iterator[str]:
         """The obstacles to weighing with this log, and their remedies."""
-        lost = {signal for each in self._remarks if each.share >= TELLING_SHARE for signal in each.signals}
+        remarks = (*self._remarks, *(each for fit in self.whole for each in fit.silent))
+        lost = {signal for each in remarks if each.share >= TELLING_SHARE for signal in each.signals}
         roles = {each.role: each for each in self.found}
         up, pitch = roles.get(Signal.VERTICAL_ACCELERATION), roles.get(Signal.PITCH_RATE)
         has_speed = {Signal.SPEED, Signal.WHEEL_SPEED} & {*(self.whole[0].found if self.whole else roles)}
