@@ -16,7 +16,7 @@ from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map, shippe
 from gateway.bus.signals.bit_field import Coding
 from gateway.bus.signals.dbc import DatabaseMessage, Databases
 from gateway.bus.signals.decode import SAME_SPEED_SHARE, TELLING_SHARE, Remark
-from gateway.bus.signals.mapping import SOURCE_ADDRESS, id_name
+from gateway.bus.signals.mapping import QUANTITIES, SOURCE_ADDRESS, id_name
 from gateway.bus.signals.signal_map import FEWEST_COUNTER_BITS, MOST_COUNTER_BITS, shipped_databases, shipped_maps
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE
 from gateway.core.batch_settings import BatchSettings
@@ -170,20 +170,22 @@ class Look:
         roles = {each.role: each for each in self.found}
         up, pitch = roles.get(Signal.VERTICAL_ACCELERATION), roles.get(Signal.PITCH_RATE)
         has_speed = {Signal.SPEED, Signal.WHEEL_SPEED} & {*(self.whole[0].found if self.whole else roles)}
-        described = any(each.quantity == "acceleration" for each in self.readings)
-        no_database = (
-            f"no database describes one in {', '.join(TO_SI['acceleration'])}: give that of the sensor by --dbc"
-        )
-        no_gravity = "the sensor is not in this log, or takes gravity off" if described else no_database
+        described = {each.quantity for each in self.readings}
         for is_missing, signal, what, remedy in (
-            (not self.whole and up is None, Signal.VERTICAL_ACCELERATION, "acceleration reads 9.8 m/s2", no_gravity),
+            (not self.whole and up is None, Signal.VERTICAL_ACCELERATION, "acceleration reads 9.8 m/s2",
+             "the sensor is not in this log, or takes gravity off"),
             (not self.whole and up is not None and pitch is None, Signal.PITCH_RATE, "pitch rate could be told",
              "drive with some braking, or name it yourself"),
             (not has_speed, Signal.SPEED, "speed", "add [signals.speed] from a GNSS receiver or the vehicle"),
         ):  # fmt: skip
-            if is_missing:
-                told = "frames or values that would show it are refused, as told above" if signal in lost else remedy
-                yield f"no {what}: {told}"
+            quantity = QUANTITIES[signal]
+            if is_missing and signal in lost:
+                yield f"no {what}: frames or values that would show it are refused, as told above"
+            elif is_missing and quantity not in described and quantity != "speed":
+                units = ", ".join(TO_SI[quantity])
+                yield f"no {what}: no database describes one in {units}: give that of the sensor by --dbc"
+            elif is_missing:
+                yield f"no {what}: {remedy}"
         if not self.whole and (self.tilt_deg or 0.0) > MOST_TILT_DEG:
             yield f"the sensor leans by {self.tilt_deg:.0f} degrees: mount it level, or have it turn its axes"
         for each in (up, pitch):
