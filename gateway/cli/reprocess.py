@@ -68,6 +68,9 @@ def summary_in_words(summary: Summary, output: str) -> str:
     if summary.copies:
         lines.append(f"left out, copies of other logs: {counted(len(summary.copies), 'log')}:")
         lines += _some([f"{copy}: has the content of {log}" for copy, log in summary.copies.items()])
+    if summary.of_others:
+        lines.append("logs that two vehicles have, and that are weighed for both: one of each is misfiled:")
+        lines += _some([f"{one}: has the content of {log}" for one, log in summary.of_others.items()])
     failures = [
         reason for outcome in summary.outcomes for reason in outcome.failures if outcome.status is not JobStatus.LOST
     ]
