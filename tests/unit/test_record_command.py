@@ -15,6 +15,7 @@ from support.bus_drive import START_NS, white_noise
 from support.commands import called
 from support.patience import PATIENCE_S, wait_until
 
+from gateway.bus.frames import take
 from gateway.bus.listen import LiveSource, SourceCounts
 from gateway.bus.logs.open import open_log
 from gateway.bus.signals import load_signal_map
@@ -124,3 +125,12 @@ def test_frames_that_the_kernel_lost_are_reported(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(LiveSource, "counts", lambda _: SourceCounts(len(DRIVE), 2, 5, 0, 0, 0))
     found = recorded(tmp_path / "drive.log.gz")
     assert found.output.endswith(f"{len(DRIVE)} frames, 7 lost\n")
+
+
+def test_a_missing_sensor_and_a_dated_adapter_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before the drive is over, and not by the command that weighs it."""
+    monkeypatch.setattr(LiveSource, "start", lambda source: source.inbox.put(take(DRIVE, DRIVE.can_id != 0x130)))
+    monkeypatch.setattr(LiveSource, "counts", lambda _: SourceCounts(len(DRIVE), 0, 0, 0, 0, 0, clock_sets=2))
+    said = recorded(tmp_path / "drive.log.gz").output.splitlines()
+    assert said[-2] == "the computer's clock dated the stamps of the adapter 2 times"
+    assert said[-1] == "has no frame of GPS_SPEED (130) for speed"
