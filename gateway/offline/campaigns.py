@@ -1,5 +1,6 @@
 """A campaign's drives: read, split into identification and validation, inspected, calibrated and judged."""
 
+import hashlib
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -107,6 +108,7 @@ def facts_of_log(
     """What reading a log showed, of which ``motion`` is the piece that is used."""
     return LogFacts(
         sha256=file_sha256(log),
+        samples=hashlib.sha256(np.ascontiguousarray(whole.columns).data).hexdigest(),
         duration_s=float(np.ptp(whole.t_ns)) / NS_PER_S,
         start_s=start_s,
         span_ns=(int(motion.t_ns.min()), int(motion.t_ns.max())) if len(motion) else None,

@@ -254,7 +254,7 @@ def test_a_drive_that_is_kept_for_validation_has_lost_nothing_that_it_has() -> N
     assert not [one for one in inspect_run(kept, EMPTY, settings) if one.severity is Severity.FAULT]
 
 
-SOUND = LogFacts("a" * 64, 900.0, 0.0, (0, 900))
+SOUND = LogFacts("a" * 64, "c" * 64, 900.0, 0.0, (0, 900))
 UNLADEN, LOADED = (0.0, 50.0), (420.0, 58.0)
 
 
@@ -265,7 +265,8 @@ UNLADEN, LOADED = (0.0, 50.0), (420.0, 58.0)
         (SOUND, LOADED, [1, 2]),  # one of the loads is wrong, and nobody knows which
         (replace(SOUND, span_ns=(600, 1500)), LOADED, [1, 2]),
         (replace(SOUND, span_ns=(900, 1800)), LOADED, []),  # the next piece of the same log
-        (replace(SOUND, sha256="b" * 64), LOADED, []),
+        (replace(SOUND, sha256="b" * 64), LOADED, [1, 2]),  # packed, or converted to another format
+        (replace(SOUND, samples="d" * 64), LOADED, []),
         (LogFacts(unreadable="gone"), LOADED, []),
     ],
 )

@@ -240,7 +240,7 @@ def test_check_config_and_look_name_ignored_parts_of_a_database(tmp_path: Path) 
     assert "message 'OTHER' in line 14 cannot be read: signal 'Bad' is longer than any message" in said.stdout
     (tmp_path / "a.log").write_text("".join(f"(1790000000.{i:06d}) can0 200#0011223344556677\n" for i in range(100)))
     assert "message 'OTHER' in line 14 cannot be read" in called("look", tmp_path / "a.log").stdout
-    many = "".join(f'BO_ {600 + i} MORE{i}: 8 A\n{UNRELATED["a billion bits"]}' for i in range(30))
+    many = "".join(f"BO_ {600 + i} MORE{i}: 8 A\n{UNRELATED['a billion bits']}" for i in range(30))
     write(tmp_path, (tmp_path / "a.dbc").read_text() + many, (tmp_path / "a.toml").read_text())
     for said in (called("look", tmp_path / "a.log"), called("check-config", config)):
         assert said.stdout.count("cannot be read") == 10

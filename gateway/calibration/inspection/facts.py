@@ -104,6 +104,7 @@ def _joined(streams: Sequence[Stream]) -> Stream:
 class LogFacts:
     """The result of reading a run's log.
 
+    ``samples`` is the hash of what was decoded, which a log has in common with its copies of any packing and format.
     ``duration_s`` is of the whole log, ``span_ns`` the first and last stamp of the run's piece of it, None if that
     piece is empty. ``unreadable`` says why nothing could be read, ``damage`` what was lost of it, ``silent`` why a
     mapped signal has no valid sample. ``mismatches`` say which frames do not fit the signal map: a sentence, their
@@ -111,6 +112,7 @@ class LogFacts:
     """
 
     sha256: str = ""
+    samples: str = ""
     duration_s: float = 0.0
     start_s: float = 0.0
     span_ns: tuple[int, int] | None = (0, 0)
@@ -120,8 +122,8 @@ class LogFacts:
     mismatches: tuple[tuple[str, float, frozenset[Signal]], ...] = ()
 
     def is_of_same_drive(self, other: "LogFacts") -> bool:
-        """Whether both are of one log and their pieces of it overlap."""
-        if not self.sha256 or self.sha256 != other.sha256 or self.span_ns is None or other.span_ns is None:
+        """Whether both are of one log, or of its copy, and their pieces of it overlap."""
+        if not self.samples or self.samples != other.samples or self.span_ns is None or other.span_ns is None:
             return False
         return self.span_ns[0] < other.span_ns[1] and other.span_ns[0] < self.span_ns[1]
 
