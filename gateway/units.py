@@ -25,7 +25,10 @@ TO_SI: Final[dict[str, dict[str, float]]] = {
     "angular_rate": {
         "rad/s": 1.0,
         "deg/s": math.pi / 180.0,
+        "deg/sec": math.pi / 180.0,
+        "degrees/s": math.pi / 180.0,
         "°/s": math.pi / 180.0,
+        "º/s": math.pi / 180.0,  # the Spanish ordinal: some databases have it in place of the degree sign
         "dps": math.pi / 180.0,
         "mrad/s": 1e-3,
     },

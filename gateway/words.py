@@ -1,9 +1,11 @@
 """Numbers with their units and nouns, and names, for people."""
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 NONE: Final = "–"
+MOST_TOLD: Final = 10  # chosen: lines of one kind that a person reads
 
 
 def counted(n: int, noun: str) -> str:
@@ -14,6 +16,12 @@ def counted(n: int, noun: str) -> str:
 def one_or_more(n: int, one: str, more: str) -> str:
     """ "one batch", "2 batches"."""
     return f"one {one}" if n == 1 else f"{n} {more}"
+
+
+def some(lines: Sequence[str], indent: str = "  ") -> list[str]:
+    """The first MOST_TOLD lines, and how many more there are."""
+    rest = [f"and {len(lines) - MOST_TOLD} more"] if len(lines) > MOST_TOLD else []
+    return [f"{indent}{line}" for line in (*lines[:MOST_TOLD], *rest)]
 
 
 def decimal(number: float | None, unit: str = "", digits: int = 2) -> str:

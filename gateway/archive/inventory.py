@@ -54,13 +54,27 @@ class Inventory:
         """Names of logs with the content of another log of the same vehicle, each with that log, which counts."""
         first: dict[tuple[str, str], str] = {}
         found: dict[str, str] = {}
+        for vehicle, log, content in self._surveyed():
+            original = first.setdefault((vehicle, content), log)
+            found |= {log: original} if original != log else {}
+        return found
+
+    def of_others(self) -> dict[str, str]:
+        """Names of logs with the content of another vehicle's log, each with that log: one of them is misfiled."""
+        first: dict[str, tuple[str, str]] = {}
+        found: dict[str, str] = {}
+        for vehicle, log, content in self._surveyed():
+            owner, original = first.setdefault(content, (vehicle, f"{log} of {vehicle}"))
+            found |= {f"{log} of {vehicle}": original} if owner != vehicle else {}
+        return found
+
+    def _surveyed(self) -> Iterator[tuple[str, str, str]]:
+        """Vehicle, name and content of each log that has frames and is surveyed."""
         for assignment, group in zip(self.manifest.assignments, self.logs, strict=True):
             for log in group:
                 told = self.facts[assignment.vehicle].get(log.key)
                 if told is not None and told.first_ns is not None:
-                    original = first.setdefault((assignment.vehicle, told.content_sha256), log.name)
-                    found |= {log.name: original} if original != log.name else {}
-        return found
+                    yield assignment.vehicle, log.name, told.content_sha256
 
     def jobs(self) -> list[ArchiveJob]:
         """The jobs of every fully surveyed vehicle, the largest first: a missing log would change its job.

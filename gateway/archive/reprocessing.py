@@ -82,6 +82,7 @@ class Summary:
     outcomes: list[JobOutcome] = field(default_factory=list)
     lost: dict[str, str] = field(default_factory=dict)  # logs and jobs to retry, with reasons
     copies: dict[str, str] = field(default_factory=dict)  # logs left out, each with the log whose content it has
+    of_others: dict[str, str] = field(default_factory=dict)  # logs of one content, of two vehicles
     took_s: float = 0.0
 
     @property
@@ -115,6 +116,7 @@ class Summary:
             "overlaps": [text for outcome in self.outcomes for text in outcome.overlaps],
             "lost": self.lost,
             "copies": self.copies,
+            "of_others": self.of_others,
             "took_s": round(self.took_s, 3),
         }
 
@@ -144,6 +146,7 @@ def reprocess(
         n_already=sum(job.slot in done for job in jobs),
         lost=dict(inventory.lost),
         copies=inventory.copies(),
+        of_others=inventory.of_others(),
     )
     _weigh(to_do, workers, summary, on_progress)
     _retire(dataset, jobs)

@@ -21,7 +21,7 @@ from gateway.bus.frames import LAST_SECOND, ExactStamp, frames_of, has_possible_
 from gateway.bus.signals.mapping import CAN_FD_BYTES, IdFilter
 from gateway.errors import BusError
 from gateway.records import EXTENDED_ID, FIRST_DATED_NS, Frames
-from gateway.units import NS_PER_S
+from gateway.units import NS_PER_S, S_PER_DAY
 
 BURST_FRAMES: Final = 4096  # chosen: taken before they are handed on
 GATHER_S: Final = 0.05  # chosen: frames are left to gather in the kernel this long: few wake-ups
@@ -77,9 +77,10 @@ class Burst:
 class Receiver:
     """Messages of an open python-can bus as bursts of frames.
 
-    A stamp before 1986 counts from the adapter's own start, as with gs_usb, canalystii, serial and systec, or with pcan
-    without the package uptime. The system's clock at the first of these dates it; from there on the adapter's clock
-    counts, until a pause of the bus, a new start of the adapter or its counter, or a step of the system's clock.
+    A stamp before 1986 or a day off the system's clock counts from the adapter's own start, as with gs_usb, canalystii,
+    serial and systec, with pcan without the package uptime, or with neovi without a clock (from 2007 on). The system's
+    clock at the first of these dates it; from there on the adapter's clock counts, until a pause of the bus, a new
+    start of the adapter or its counter, or a step of the system's clock.
     """
 
     def __init__(
@@ -171,7 +172,8 @@ class Receiver:
             return stamp_s
         if not isinstance(stamp_s, int | float) or not 0.0 < stamp_s <= LAST_SECOND:
             return ExactStamp(time.time_ns())
-        if self._socket is not None or stamp_s * NS_PER_S >= FIRST_DATED_NS:
+        is_date = stamp_s * NS_PER_S >= FIRST_DATED_NS and abs(stamp_s - now_s) < S_PER_DAY
+        if self._socket is not None or is_date:
             return stamp_s
         is_off = abs(self._adapter_start_s + stamp_s - now_s) > MOST_OFF_S
         if is_off or abs(stamp_s - self._last_stamp_s) > PAUSE_S:

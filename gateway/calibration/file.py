@@ -175,7 +175,9 @@ def load_calibration(path: Path | str, read: Read = Path.read_bytes) -> Calibrat
         text = read(path).decode("utf-8")
     except FileNotFoundError:
         raise CalibrationFileError(f"{path}: no such calibration file") from None
-    except (OSError, UnicodeDecodeError) as fault:
+    except OSError as fault:
+        raise CalibrationFileError(f"{path}: cannot be read: {fault.strerror or fault}") from None
+    except UnicodeDecodeError as fault:
         raise CalibrationFileError(f"{path}: cannot be read: {fault}") from None
     try:
         content = json.loads(text)

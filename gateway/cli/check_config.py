@@ -17,6 +17,7 @@ from gateway.service.lifecycle import startable_faults
 from gateway.setup import Setup, setup_of
 from gateway.stated.doubt import DoubtKind
 from gateway.uplink.settings import uplink_settings, webhook_settings
+from gateway.words import some
 
 
 @click.command("check-config")
@@ -43,11 +44,8 @@ def check_config(config: Path) -> Told:
         "webhook": pushing.receiver if pushing else None,
         "unsound_messages": list(unsound_messages(setup.signal_map.name)),
     }
-    return summary, "\n".join([*_sentences(config, settings, setup), *map(_left_out, summary["unsound_messages"])])
-
-
-def _left_out(fault: str) -> str:
-    return f"Left out, as the signal map does not use it: {fault}"
+    left_out = [f"Left out, as the signal map does not use it: {fault}" for fault in summary["unsound_messages"]]
+    return summary, "\n".join([*_sentences(config, settings, setup), *some(left_out, "")])
 
 
 def _sentences(config: Path, settings: Settings, setup: Setup) -> Iterator[str]:

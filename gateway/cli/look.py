@@ -11,6 +11,7 @@ from gateway.cli.options import FILE, Told, prints
 from gateway.offline.look.heard import Heard
 from gateway.offline.look.log_look import Look, MapFit
 from gateway.units import STANDARD_GRAVITY_MPS2
+from gateway.words import some
 
 MOST_UNKNOWN: Final = 12  # chosen: lines of identifiers that nothing describes
 
@@ -45,7 +46,7 @@ def look_lines(seen: Look, written: list[str]) -> Iterator[str]:
     yield from (_identifier(one) for one in seen.heard if one.message or one in unknown[:MOST_UNKNOWN])
     if len(unknown) > MOST_UNKNOWN:
         yield f"... and {len(unknown) - MOST_UNKNOWN} identifiers more that no database describes"
-    yield from seen.faults
+    yield from some(seen.faults, "")
     yield "\nAccelerations, usual reading, and signals with a role:"
     roles = {id(found.reading): f"  {found.role}, sign {found.sign:+d}: {found.why}" for found in seen.found}
     for each in seen.readings:
@@ -73,6 +74,7 @@ def _fit(fit: MapFit) -> str:
     if fit.vertical_mps2 is not None:
         told += f"; its vertical axis reads {fit.vertical_mps2:+.2f} m/s2"
         told += "" if fit.has_gravity else f", where gravity is {STANDARD_GRAVITY_MPS2:+.2f}"
+    told = "; ".join((told, *(each.text for each in fit.silent)))
     return f"  {fit.name}{f' on {fit.channel}' if fit.channel else ''}: {told}"
 
 

@@ -56,12 +56,9 @@ def record(log: Path, signals: str, interface: str, channel: str, for_s: float |
         raise SpringscaleError(f"{log}: no mapped frame came ({source.reason or 'the bus was silent'})")
     others = {"remote_frames": counts.remote_frames, "error_frames": counts.error_frames}
     remarks = [f"left out: {counted(n, name[:-1].replace('_', ' '))}" for name, n in others.items() if n]
-    remarks += [f"no frame of {silent}" for silent in decoder.silent()]
-    remarks += [remark.text for remark in decoder.remarks()]
+    remarks += [remark.text for remark in (*decoder.silent(), *decoder.remarks())]
     if n := counts.clock_sets:
-        remarks.append(
-            f"the adapter counts from a start of its own: dated by this computer's clock, {counted(n, 'time')}"
-        )
+        remarks.append(f"the adapter's stamps were dated by this computer's clock, {counted(n, 'time')}")
     told = {"output": str(log), "n_frames": n_frames, "n_dropped": n_dropped, **others, "remarks": remarks}
     return told, "\n".join([f"{log}: {n_frames} frames, {n_dropped} lost", *remarks])
 

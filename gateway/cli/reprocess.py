@@ -1,7 +1,6 @@
 """springscale reprocess: a fleet's archive of logs to a data set of estimates, on all cores or on a cluster."""
 
 import sys
-from typing import Final
 
 import click
 
@@ -14,7 +13,7 @@ from gateway.archive.workers import local_workers, workers_of
 from gateway.cli.options import as_json
 from gateway.cli.progress import StatusLine
 from gateway.records import json_line
-from gateway.words import counted
+from gateway.words import counted, some
 
 
 @click.command("reprocess")
@@ -44,9 +43,6 @@ def reprocess(
         sys.exit(1)
 
 
-MOST_TOLD: Final = 10  # chosen: failures, one line each; the data set has them all
-
-
 def how_far(progress: Progress) -> str:
     """ "weighing: 12 of 340 jobs, 1.2 of 34.0 GB, 52 MB/s, 11 min left" """
     pieces = "jobs" if progress.what == "weighing" else "logs"
@@ -67,22 +63,25 @@ def summary_in_words(summary: Summary, output: str) -> str:
     ]
     if summary.copies:
         lines.append(f"left out, copies of other logs: {counted(len(summary.copies), 'log')}:")
-        lines += _some([f"{copy}: has the content of {log}" for copy, log in summary.copies.items()])
+        lines += some([f"{copy}: has the content of {log}" for copy, log in summary.copies.items()])
+    if summary.of_others:
+        lines.append("logs that two vehicles have, and that are weighed for both: one of each is misfiled:")
+        lines += some([f"{one}: has the content of {log}" for one, log in summary.of_others.items()])
     failures = [
         reason for outcome in summary.outcomes for reason in outcome.failures if outcome.status is not JobStatus.LOST
     ]
     if failures:
         lines.append(f"failed: {counted(summary.n_failed_logs, 'log')}:")
-        lines += _some(failures)
+        lines += some(failures)
     if refused := [text for outcome in summary.outcomes for text in outcome.refused]:
         lines.append("frames refused, which explains batches that were not weighed:")
-        lines += _some(refused)
+        lines += some(refused)
     if overlaps := [text for outcome in summary.outcomes for text in outcome.overlaps]:
         lines.append("logs of the same time, whose drives may count twice or not at all: keep one of each:")
-        lines += _some(overlaps)
+        lines += some(overlaps)
     if summary.lost:
         lines.append(f"not done: {len(summary.lost)}; run again to try them:")
-        lines += _some([f"{what}: {why}" for what, why in summary.lost.items()])
+        lines += some([f"{what}: {why}" for what, why in summary.lost.items()])
     return "\n".join(lines)
 
 
@@ -102,8 +101,3 @@ def duration(seconds: float) -> str:
     if seconds < 6000.0:
         return f"{seconds / 60.0:.0f} min"
     return f"{seconds / 3600.0:.1f} h" if seconds < 48 * 3600.0 else f"{seconds / 86400.0:.1f} days"
-
-
-def _some(lines: list[str]) -> list[str]:
-    rest = len(lines) - MOST_TOLD
-    return [*(f"  {line}" for line in lines[:MOST_TOLD]), *([f"  and {rest} more"] if rest > 0 else [])]

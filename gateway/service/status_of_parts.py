@@ -10,7 +10,7 @@ from typing import Final
 from gateway.bus.listen import LiveSource, SourceState
 from gateway.bus.ring_log import RingLog
 from gateway.config import Settings
-from gateway.records import Signal
+from gateway.records import FIRST_DATED_NS, Signal
 from gateway.service.pipeline import Pipeline
 from gateway.setup import Setup
 from gateway.status import (
@@ -37,6 +37,7 @@ READ_IN: Final = {  # customary units
     Signal.AIR_SPRING_PRESSURE: ("kPa", 1e3),
     Signal.RIDE_HEIGHT: ("mm", 1e-3),
 }
+CLOCK_NOT_SET: Final = "the computer's clock is not set: until it is, estimates have dates of 1970"
 SPEED_LOST_S = 10.0  # chosen: without a valid speed for this long the service waits for one
 
 
@@ -85,7 +86,8 @@ class StatusReport:
             record=self.ring_log.status() if self.ring_log else None,
             alarms=self.alarms(),
         )
-        return judged(now, self.faults())
+        is_clock_set = time.time_ns() >= FIRST_DATED_NS
+        return judged(now, (*self.faults(), *(() if is_clock_set else (CLOCK_NOT_SET,))))
 
     def state(self) -> State:
         """The worst state that applies."""

@@ -15,7 +15,7 @@ from gateway.store import StoreReader
 from gateway.web import pages
 from gateway.web.access import problems
 from gateway.web.access.guard import Access, bearer
-from gateway.web.access.middleware import HeadAsGet, SecurityHeaders
+from gateway.web.access.middleware import BodyLimit, HeadAsGet, SecurityHeaders
 from gateway.web.access.tokens import TokenFile
 from gateway.web.live.board import LATEST_PATH, Board, LatestResponse
 from gateway.web.routes import service_calls as service
@@ -67,14 +67,13 @@ def create_app(
     responses: Counter[int] = Counter()
 
     app = _Application(
-        wrap=lambda inner: SecurityHeaders(HeadAsGet(inner), responses),
+        wrap=lambda inner: SecurityHeaders(HeadAsGet(BodyLimit(inner, BODY_BYTES)), responses),
         title="Springscale",
         version=API_VERSION,
         description=_DESCRIPTION,
         docs_url=None,
         redoc_url=None,
         redirect_slashes=False,
-        max_body_size=BODY_BYTES,
     )
     scales = Scales(calibrated)
     metrics = metrics_registry(board, scales, status, responses)

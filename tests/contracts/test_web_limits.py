@@ -75,8 +75,9 @@ def test_an_endless_body_is_refused(tmp_path: Path, kind: bytes, body: bytes) ->
     async def scenario(server: Server) -> None:
         reader, writer = await asyncio.open_connection(*server.socket.getsockname())
         writer.write(head + kind + b"\r\n\r\n" + body)
-        answer = await asyncio.wait_for(reader.readuntil(b"\r\n"), PATIENCE_S)
+        answer = await asyncio.wait_for(reader.readuntil(b"2,000,000 bytes"), PATIENCE_S)
         assert answer.startswith(b"HTTP/1.1 413 ")
+        assert b"\r\ncontent-type: application/problem+json\r\n" in answer
         writer.transport.abort()
 
     run(tmp_path, scenario)

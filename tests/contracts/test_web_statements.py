@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from support.learner import ANSWERS, LearnerBench, at, found
 from support.learner import VEHICLE as VAN
+from support.paper_van import paper_van
 from support.web import Client, Gateway
 
 from gateway.calibration.file import load_calibration
@@ -350,6 +351,15 @@ def test_a_box_that_moves_to_another_vehicle_is_told(local: Client, bench: Learn
         client.request("PUT", VEHICLE, json=ANSWERS)
         assert client.get(LEARNING).json()["fault"] is None
     assert LearnerBench(bench.directory, replace(VAN, id="van-18")).learner.fault is None
+
+
+def test_a_sister_of_another_model_in_the_settings_is_told(local: Client, bench: LearnerBench) -> None:
+    """The service learnt nothing, and asked to confirm a vehicle about which it had no question."""
+    local.request("PUT", VEHICLE, json=ANSWERS)
+    sister = paper_van(wheelbase_m=3.3)
+    fault = LearnerBench(bench.directory, replace(VAN, sister=sister)).learner.fault
+    assert str(fault).startswith("nothing is learnt: ")
+    assert "another model; give the calibration of a vehicle of its own model" in str(fault)
 
 
 def test_statements_are_kept_while_learning_is_off(tmp_path: Path) -> None:

@@ -78,6 +78,8 @@ CASES = {  # stamps (n,), arrivals after NOW_S (n,), times the clock is set
     "gs_usb begins again while parked": (ticks(1000, "gs_usb", PARKED_S), PARKED_S, 2),
     "gs_usb is replugged": (100.0 + STEADY_S - 99.0 * (np.arange(N) >= N // 2), STEADY_S, 2),
     "pcan since the computer's start": (86_400.0 + STEADY_S, STEADY_S, 1),
+    "neovi since 2007": (1_167_609_600.0 + 86_400.0 + STEADY_S, STEADY_S, 1),
+    "ixxat of python-can 4.6.1": (1.5 * NOW_S + 142.0 + STEADY_S, STEADY_S, 1),
     "stamps since 1970": (NOW_S + STEADY_S, STEADY_S, 0),
     "usb2can in milliseconds": (1000.0 * (1.0 + STEADY_S), STEADY_S, N),
     "the system's clock learns the date": (7.0 + STEADY_S, STEADY_S + 1e6 * (np.arange(N) > 9), 2),

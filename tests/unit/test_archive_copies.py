@@ -85,4 +85,6 @@ def test_similar_logs_are_no_copies(tmp_path: Path) -> None:
     write_manifest(tmp_path, "van-1", "van-2")
     summary = weighed(tmp_path, "out")
     assert summary.copies == {}
+    assert summary.of_others == {"van-2/1.log of van-2": "van-1/1.log of van-1"}
+    assert "van-2/1.log of van-2: has the content of van-1/1.log of van-1" in summary_in_words(summary, "out")
     assert summary.n_failed_logs == 2

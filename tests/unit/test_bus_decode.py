@@ -147,6 +147,20 @@ def test_a_signal_exists_only_under_its_multiplexers_as_cantools_sees_it(write_m
     assert decoder.counts[Signal.SPEED].rejected == {Rejected.MULTIPLEXED_OUT: 17}
 
 
+def test_a_condition_under_another_multiplexer_is_no_condition_of_other_bits(write_map):
+    """The bits of a status that is not in the frame are those of another signal."""
+    signal_map = write_map(
+        'BO_ 5 M: 8 A\n SG_ Page M : 0|8@1+ (1,0) [0|0] "" A\n SG_ Speed : 8|8@1+ (1,0) [0|0] "m/s" A\n'
+        ' SG_ Valid m1 : 16|8@1+ (1,0) [0|0] "" A\n',
+        '[signals.speed]\nmessage = "M"\nsignal = "Speed"\nvalid_when = { Valid = 1 }\n',
+    )
+    payloads = [bytes([page, 20, bits, 0, 0, 0, 0, 0]) for page in (0, 1) for bits in (0, 1)]
+    decoder = Decoder(signal_map)
+    motion = decoder.decode(frames(*((5, payload) for payload in payloads)))
+    np.testing.assert_array_equal(motion.columns[:, 0], [np.nan, np.nan, np.nan, 20.0])
+    assert decoder.counts[Signal.SPEED].rejected == {Rejected.INVALID: 3}
+
+
 def test_can_fd_payloads_are_read_to_their_end_and_too_narrow_rows_are_a_wrong_length(write_map):
     signal_map = write_map(
         'BO_ 6 M: 48 A\n SG_ S : 368|16@1- (0.001,0) [0|0] "g" A\n',

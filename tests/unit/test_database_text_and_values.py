@@ -100,6 +100,34 @@ def test_messages_without_frames_are_reported(tmp_path):
     assert [*report.remarks()] == [f"{tmp_path / 'a.log'}: has no frame of GYRO (00000201) for pitch_rate"]
 
 
+SPEED = 'SG_ Twin : 32|8@1+ (1,0) [0|0] "m/s" A'
+WITHOUT_A_SAMPLE = {  # the line of the speed, its entry in the map, and what is said of its two frames of zeros
+    "a condition": (SPEED, "valid_when = { State = 2 }", "2 do not meet valid_when"),
+    "a multiplexer": (
+        f'{SPEED.replace("Twin", "Twin m1")}\n SG_ Page M : 56|8@1+ (1,0) [0|0] "" A',
+        "",
+        "2 have other signals in its place (multiplexed)",
+    ),
+    "no number": (SPEED.replace("32|8@1+ (1", "0|32@1- (1"), "", "2 have no number"),
+}
+
+
+@pytest.mark.parametrize("kind", WITHOUT_A_SAMPLE)
+def test_a_signal_of_which_no_frame_counts_is_reported(kind, tmp_path):
+    line, more, said = WITHOUT_A_SAMPLE[kind]
+    dbc = DBC.replace(SPEED, line).replace("Twin : 40", "Other : 40") + "SIG_VALTYPE_ 512 Twin : 1;\n" * (
+        kind == "no number"
+    )
+    (tmp_path / "a.dbc").write_text(dbc)
+    (tmp_path / "a.toml").write_text(f'{MAP}[signals.speed]\nmessage = "BOX"\nsignal = "Twin"\n{more}\n')
+    frames = "(1790000000.5) can0 200#0000C07F00000100\n(1790000000.6) can0 200#0000C07F00000100\n"
+    (tmp_path / "a.log").write_text(frames)
+    motions, report = motion_of_log(tmp_path / "a.log", load_signal_map(tmp_path / "a.toml"))
+    assert all(np.isnan(motion.of(Signal.SPEED)[1]).all() for motion in motions)
+    (remark,) = report.remarks()
+    assert remark == f"{tmp_path / 'a.log'}: has no sample of speed: of 2 frames of BOX (200), {said}"
+
+
 def test_one_signal_measures_one_thing(tmp_path):
     (tmp_path / "a.dbc").write_text(DBC)
     (tmp_path / "a.toml").write_text(MAP + '[signals.roll_rate]\nmessage = "BOX"\nsignal = "Rate"\n')

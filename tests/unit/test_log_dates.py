@@ -212,7 +212,7 @@ def test_a_header_of_a_trc_log_that_cannot_be_read_ends_no_reading(line, tmp_pat
     assert report.frames == report.wanted + report.n_rejected
 
 
-@pytest.mark.parametrize("date", [*NO_DATES, "Thu Apr 31 10:00:00 2022"])
+@pytest.mark.parametrize("date", [*NO_DATES, "Thu Apr 31 10:00:00 2022", f"Sun {'9' * 25} 29 05:25:06 2026"])
 def test_a_date_that_is_ambiguous_or_impossible_is_none(date, tmp_path):
     """It became a wrong one, or the stamps were blamed."""
     frames, report = read(tmp_path / "a.asc", asc(date))

@@ -235,9 +235,11 @@ def test_two_channels_are_two(tmp_path: Path) -> None:
     ]
 
 
-UNITS = "m/s^2, m/s2, m/s², m/s/s, g, mg"
-UNKNOWN = f"no acceleration reads 9.8 m/s2: no database describes one in {UNITS}: give that of the sensor by --dbc"
+NO_DATABASE = "no database describes one in {}: give that of the sensor by --dbc"
+UNKNOWN = f"no acceleration reads 9.8 m/s2: {NO_DATABASE.format('m/s^2, m/s2, m/s², m/s/s, g, mg')}"
+RATES = "rad/s, deg/s, deg/sec, degrees/s, °/s, º/s, dps, mrad/s"
 NO_GRAVITY = "no acceleration reads 9.8 m/s2: the sensor is not in this log, or takes gravity off"
+NO_RATE = f"no pitch rate could be told: {NO_DATABASE.format(RATES)}"
 NO_SPEED = "no speed: add [signals.speed] from a GNSS receiver or the vehicle"
 
 
@@ -249,8 +251,9 @@ NO_SPEED = "no speed: add [signals.speed] from a GNSS receiver or the vehicle"
          [f"{name} comes 20 times a second; 40 are needed" for name in ("BOX.AccY", "TURN.GyroX")]),
         (packed(0x321, 8, T0_NS + np.arange(500) * 10_000_000), "", [UNKNOWN, NO_SPEED]),
         (packed(512, 8, T0_NS + np.arange(500) * 10_000_000), DBC.replace('"m/s^2"', '"m/s**2"'), [UNKNOWN, NO_SPEED]),
+        (box_on_its_side(), DBC.replace('"deg/s"', '"Unit_DegreePerSecond"'), [NO_RATE]),
     ],
-    ids=["no gravity", "slow", "no database", "an unknown unit"],
+    ids=["no gravity", "slow", "no database", "an unknown unit", "an unknown unit of the rates"],
 )  # fmt: skip
 def test_obstacles_are_reported(frames: Frames, dbc: str, lacking: list[str], tmp_path: Path) -> None:
     if dbc:
@@ -281,7 +284,19 @@ def test_a_database_of_another_device_is_no_certainty(tmp_path: Path) -> None:
     payload = drive.payload.copy()
     payload[drive.can_id < 0x130, 7] = 0
     write_candump(Frames(drive.t_ns, drive.can_id, drive.length, payload), "can0", tmp_path / "drive.log")
-    assert "is springscale_reference.dbc the database of this device?" in run(tmp_path / "drive.log")
+    told = run(tmp_path / "drive.log")
+    assert "is springscale_reference.dbc the database of this device?" in told
+    assert "has no sample of pitch_rate: of 3,000 frames of IMU_GYRO (121), 3,000 do not meet valid_when" in told
+
+
+def test_a_receiver_without_a_fix_is_no_missing_speed(tmp_path: Path) -> None:
+    drive = bus_drive(30.0, seed=3)
+    payload = drive.payload.copy()
+    payload[drive.can_id == 0x130, 3] = 0
+    write_candump(Frames(drive.t_ns, drive.can_id, drive.length, payload), "can0", tmp_path / "drive.log")
+    told = run(tmp_path / "drive.log")
+    assert "has no sample of speed: of 150 frames of GPS_SPEED (130), 150 do not meet valid_when" in told
+    assert "no speed: frames or values that would show it are refused, as told above" in told
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,6 @@ from gateway.bus.signals import load_signal_map
 from gateway.bus.sink import BusSink
 from gateway.cli import record
 from gateway.errors import SpringscaleError
-from gateway.records import Signal
 
 SIGNAL_MAP = load_signal_map("springscale:reference")
 DRIVE = white_noise(20.0, START_NS, seed=1)
@@ -118,17 +117,6 @@ def test_frames_carry_the_channel_of_the_map_and_else_that_of_the_bus(
     assert sum(map(len, open_log(tmp_path / "drive.log.gz", load_signal_map(str(signals)))[0])) == len(DRIVE)
 
 
-def test_a_silent_message_and_an_adapters_own_clock_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def played(source: LiveSource) -> None:
-        source.inbox.put(take(DRIVE, DRIVE.can_id != SIGNAL_MAP.message_of(Signal.SPEED).frame_id))
-        source._tally["clock_sets"] = 1
-
-    monkeypatch.setattr(LiveSource, "start", played)
-    said = recorded(tmp_path / "drive.log.gz").output
-    assert "no frame of GPS_SPEED (130) for speed\n" in said
-    assert "the adapter counts from a start of its own: dated by this computer's clock, 1 time\n" in said
-
-
 def test_frames_that_the_kernel_lost_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def played(source: LiveSource) -> None:
         source.inbox.put(DRIVE)
@@ -137,3 +125,12 @@ def test_frames_that_the_kernel_lost_are_reported(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(LiveSource, "counts", lambda _: SourceCounts(len(DRIVE), 2, 5, 0, 0, 0))
     found = recorded(tmp_path / "drive.log.gz")
     assert found.output.endswith(f"{len(DRIVE)} frames, 7 lost\n")
+
+
+def test_a_missing_sensor_and_a_dated_adapter_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before the drive is over, and not by the command that weighs it."""
+    monkeypatch.setattr(LiveSource, "start", lambda source: source.inbox.put(take(DRIVE, DRIVE.can_id != 0x130)))
+    monkeypatch.setattr(LiveSource, "counts", lambda _: SourceCounts(len(DRIVE), 0, 0, 0, 0, 0, clock_sets=2))
+    said = recorded(tmp_path / "drive.log.gz").output.splitlines()
+    assert said[-2] == "has no frame of GPS_SPEED (130) for speed"
+    assert said[-1] == "the adapter's stamps were dated by this computer's clock, 2 times"

@@ -22,6 +22,7 @@ from gateway.service.gateway import Gateway
 from gateway.service.status_of_parts import SENSOR_LOST_S, StatusReport
 from gateway.setup import setup_of
 from gateway.status import State, Status
+from gateway.units import NS_PER_S
 
 SIGNALS = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE, Signal.SPEED)
 ALL_HEARD: Mapping[Signal, float | None] = dict.fromkeys(SIGNALS, 0.0)
@@ -120,3 +121,14 @@ def test_samples_that_come_after_their_window_are_counted(tmp_path: Path) -> Non
         assert 0 < running.http("/api/v1/status")["batches"]["n_late_rows"] <= end - begin
 
     serve(configuration(tmp_path, calibration_text(calibration_file(payload_kg=12.0))), drive)
+
+
+def test_a_clock_that_is_not_set_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def look(running: Running) -> None:
+        assert running.http("/api/v1/status")["warnings"] == []
+        monkeypatch.setattr("gateway.service.status_of_parts.time.time_ns", lambda: 60 * NS_PER_S)
+        (warning,) = running.http("/api/v1/status")["warnings"]
+        monkeypatch.undo()
+        assert "clock is not set" in warning
+
+    serve(configuration(tmp_path, calibration_text()), look)

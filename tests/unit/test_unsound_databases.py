@@ -112,6 +112,8 @@ MAPPED = {
     "a place of 400 digits": ("State : 48|", f"State : {HUGE}|", "'State' is longer than any message"),
     "an infinite offset": ("16@1- (0.001,0)", "16@1- (1,-1e999)", "'Accel' has scale .* and offset -inf"),
     "the same name twice": (OTHER, OTHER.replace("OTHER", "BOX"), "'BOX' is twice in a.dbc"),
+    "29 bits without the mark": ("BO_ 512 BOX", "BO_ 274923520 BOX", "a DBC writes one of 29 bits as 2422407168"),
+    "names of values without their end": ('"off" ;', '"off"', "'VAL_ 512 State .*' does not end with a semicolon"),
     "a wide range": (
         TAIL, f"{TAIL}SG_MUL_VAL_ 512 Accel State 0-65536;\n", "more than 65,536 multiplexer values"
     ),
@@ -238,3 +240,8 @@ def test_check_config_and_look_name_ignored_parts_of_a_database(tmp_path: Path) 
     assert "message 'OTHER' in line 14 cannot be read: signal 'Bad' is longer than any message" in said.stdout
     (tmp_path / "a.log").write_text("".join(f"(1790000000.{i:06d}) can0 200#0011223344556677\n" for i in range(100)))
     assert "message 'OTHER' in line 14 cannot be read" in called("look", tmp_path / "a.log").stdout
+    many = "".join(f"BO_ {600 + i} MORE{i}: 8 A\n{UNRELATED['a billion bits']}" for i in range(30))
+    write(tmp_path, (tmp_path / "a.dbc").read_text() + many, (tmp_path / "a.toml").read_text())
+    for said in (called("look", tmp_path / "a.log"), called("check-config", config)):
+        assert said.stdout.count("cannot be read") == 10
+        assert "and 21 more" in said.stdout

@@ -248,11 +248,10 @@ class LogReport:
             seen = ", ".join(sorted(self.channels)[:NAMED_CHANNELS])
             yield f"{self.path}: mapped frames are on {seen}; if these are one bus twice, name one in the map"
         decoder = self.decoder if with_decoder else None
-        for silent in decoder.silent() if decoder is not None and self.wanted else ():
-            yield f"{self.path}: has no frame of {silent}"
+        silent = decoder.silent() if decoder is not None and self.wanted else ()
         refused = () if decoder is None else decoder.remarks()
-        texts = (*self.notes, *(remark.text for remark in refused), *self.remarks_on_dates(), *self.remarks_on_clock())
-        yield from (f"{self.path}: {text}" for text in texts)
+        texts = (*(remark.text for remark in (*silent, *refused)), *self.notes)
+        yield from (f"{self.path}: {text}" for text in (*texts, *self.remarks_on_dates(), *self.remarks_on_clock()))
 
     def causes(self) -> tuple[Remark, ...]:
         """What the decoder refused so often that it explains why nothing is weighed."""

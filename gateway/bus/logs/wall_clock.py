@@ -52,7 +52,7 @@ def date_in(text: str) -> datetime | None:
         return datetime(
             int(told["year"]), month, int(told["day"]), hour, int(told["minute"]), second, microsecond, zone
         )
-    except ValueError:  # the 31st of April, 25 o'clock
+    except (ValueError, OverflowError):  # the 31st of April, 25 o'clock
         return None
 
 

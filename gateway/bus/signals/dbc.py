@@ -17,6 +17,7 @@ from typing import Final
 import cantools
 from cantools.database.can import Signal as CantoolsSignal
 
+from gateway.bus.frames import LAST_EXTENDED, LAST_STANDARD
 from gateway.bus.signals.bit_field import BitField, Coding
 from gateway.bus.text_encoding import text_of
 from gateway.errors import SignalMapError
@@ -42,6 +43,7 @@ _SIGNAL: Final = re.compile(r"\bSG_\s+(\w+)")
 _BITS: Final = re.compile(r"\bSG_\s+(\w+)(?:\s+\w+)?\s*:\s*(-?\d+)\s*\|\s*(\d+)")
 _OF_MESSAGE: Final = re.compile(r"\s*(VAL_|SIG_VALTYPE_|SG_MUL_VAL_)\s+(\d+)\s+(\w+)")
 _ABOUT_MESSAGE: Final = re.compile(r"\s*(?:SIG_VALTYPE_|SG_MUL_VAL_)\s+\S")
+_STRING: Final = re.compile(r'"[^"]*"')
 _WORD: Final = re.compile(r"\w+")
 _LONG_NAME: Final = re.compile(
     r'\s*BA_\s+"(?:SystemMessageLongSymbol"\s+BO_\s+(\d+)|SystemSignalLongSymbol"\s+SG_\s+(\d+)\s+(\w+))\s+"([^"\n]+)"\s*;'
@@ -138,7 +140,7 @@ class Databases:
         try:
             return _read_by_cantools(message, path)
         except Exception as fault:  # noqa: BLE001 - numbers beyond a double, texts that are none, a thousand brackets
-            said = _LINE.sub("", str(fault) or type(fault).__name__)
+            said = _LINE.sub("", _without_end(message) or str(fault) or type(fault).__name__)
             raise SignalMapError(
                 f"{self._map_path}: dbc: {path}: message {message.name!r} in line {message.line} cannot be read: "
                 f"{said[:TOLD_CHARS]}{'...' if len(said) > TOLD_CHARS else ''}"
@@ -194,6 +196,8 @@ def _require_sane(message: _Statements) -> None:
     """Raise ValueError for numbers that no message has."""
     if len(message.number) > 10 or int(message.number) >= 1 << 32:
         raise ValueError(f"{message.number[:20]} is no identifier: 32 bits hold one")
+    if LAST_STANDARD < (number := int(message.number)) <= LAST_EXTENDED:
+        raise ValueError(f"{number} is no identifier of 11 bits; a DBC writes one of 29 bits as {number | EXTENDED_ID}")
     head = _MESSAGE.match(message.block)
     if head is not None and _is_absurd(head[3]):
         raise ValueError(f"it has {head[3][:20]} bytes: no message is so long")
@@ -206,6 +210,12 @@ def _require_sane(message: _Statements) -> None:
             n_selected[found[1]] += max(1, int(high) - int(low) + 1)
     if math.prod(n_selected.values()) > MOST_SELECTED:
         raise ValueError(f"SG_MUL_VAL_: its ranges name more than {MOST_SELECTED:,} multiplexer values")
+
+
+def _without_end(message: _Statements) -> str | None:
+    """What is wrong if a statement lacks its end: cantools finds fault with the next one."""
+    unended = next((one for one in message.others if ";" not in _STRING.sub("", one)), None)
+    return None if unended is None else f"{unended.strip().splitlines()[0]!r} does not end with a semicolon"
 
 
 def _is_absurd(digits: str) -> bool:

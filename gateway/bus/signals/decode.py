@@ -45,6 +45,15 @@ class Rejected(StrEnum):
     OUT_OF_RANGE = "out_of_range"
 
 
+_QUIET: Final[Mapping[Rejected, str]] = {
+    Rejected.MULTIPLEXED_OUT: "have other signals in its place (multiplexed)",
+    Rejected.NOT_AVAILABLE: "say that it is not available",
+    Rejected.INVALID: "do not meet valid_when",
+    Rejected.NOT_A_NUMBER: "have no number",
+}
+"""Reasons that are usual for some frames, and a cause if they are those of all."""
+
+
 @dataclass(frozen=True, slots=True)
 class SignalCounts:
     """Outcomes of the frames that can carry one signal."""
@@ -112,10 +121,9 @@ class Decoder:
         """The causes that explain why nothing is weighed: they concern a good part of a signal that weighing needs."""
         return tuple(one for one in self.remarks() if one.share >= TELLING_SHARE and one.signals & NEEDED)
 
-    def silent(self) -> tuple[str, ...]:
-        """Messages of which no frame came, each with the signals that weighing needs; none for other messages."""
-        needed = ((one, sorted(NEEDED.intersection(one.signals))) for one in self._messages if not one.n_frames)
-        return tuple(f"{message.name} for {', '.join(signals)}" for message, signals in needed if signals)
+    def silent(self) -> tuple[Remark, ...]:
+        """Signals that weighing needs and that have no sample, by message: no frame came, or none counts."""
+        return tuple(remark for message in self._messages for remark in message.silent())
 
 
 class _MessageReader:
@@ -189,6 +197,18 @@ class _MessageReader:
                     "are no measurement; if they are, remove the names there"
                 )
                 yield Remark(f"{said}: {text}", n / self.n_frames, frozenset({one.mapped.signal}))
+
+    def silent(self) -> Iterator[Remark]:
+        """Needed signals without a sample, unless :meth:`remarks` say why."""
+        needed = NEEDED & self.signals
+        if needed and not self.n_frames:
+            yield Remark(f"has no frame of {self.name} for {', '.join(sorted(needed))}", 0.0, needed)
+        for one in self.readers if self.n_frames else ():
+            quiet = {reason: n for reason, n in one.rejected.items() if reason in _QUIET}
+            if one.mapped.signal in needed and sum(quiet.values()) == self.n_frames:
+                told = ", ".join(f"{n:,} {_QUIET[reason]}" for reason, n in quiet.items())
+                text = f"has no sample of {one.mapped.signal}: of {self.n_frames:,} frames of {self.name}, {told}"
+                yield Remark(text, 1.0, frozenset({one.mapped.signal}))
 
 
 class _SignalReader:

@@ -80,7 +80,7 @@ def resolve_signal(
         maximum=maximum,
         latency_s=entry.latency_s,
         multiplexed_by=_multiplexers(where, named, message),
-        valid_when=tuple(_condition(where, name, allowed, message) for name, allowed in entry.valid_when.items()),
+        valid_when=tuple(one for each in entry.valid_when.items() for one in _conditions(where, *each, message)),
         rejects_j1939_codes=(j1939 and bool(message.frame_id & EXTENDED_ID) and named.field.coding is Coding.UNSIGNED),
         # raw bits that the database gives a name, such as Error: a measured signal has numbers, a name is none
         named_codes=() if is_state else tuple(sorted({_bits_of(raw, named.field) for raws in names for raw in raws})),
@@ -164,14 +164,17 @@ def _multiplexers(where: str, signal: DatabaseSignal, message: DatabaseMessage) 
     return tuple(chain.values())
 
 
-def _condition(where: str, name: str, allowed: Accepted | list[Accepted], message: DatabaseMessage) -> Condition:
+def _conditions(
+    where: str, name: str, allowed: Accepted | list[Accepted], message: DatabaseMessage
+) -> tuple[Condition, ...]:
+    """One entry of valid_when: the judged signal is in the frame, and has one of the values."""
     key = f"{where}.valid_when"
     judged = _decodable(key, name, message)
     choices = allowed if isinstance(allowed, list) else [allowed]
     if not choices:
         raise SignalMapError(f"{key}.{name}: an empty list allows no frame; name the values under which this counts")
     bits = [each for choice in choices for each in _allowed_bits(f"{key}.{name}", choice, judged)]
-    return Condition(judged.field, tuple(dict.fromkeys(bits)))
+    return *_multiplexers(key, judged, message), Condition(judged.field, tuple(dict.fromkeys(bits)))
 
 
 def _allowed_bits(where: str, allowed: Accepted, signal: DatabaseSignal) -> tuple[int, ...]:

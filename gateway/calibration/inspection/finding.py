@@ -108,7 +108,8 @@ class Kind(StrEnum):
         "restart the receiver; check its antenna, and valid_when in the signal map")
     SPEED_OUTSIDE_GATE = ("speed_outside_gate", _FAULT,
         "drive on an open road; check the unit of speed in the signal map")
-    SPEED_UNIT = "speed_unit", _FAULT, "check the unit of speed in the signal map, and wheelbase_m"
+    SPEED_UNIT = ("speed_unit", _FAULT,
+        "check the unit of speed in the signal map, wheelbase_m, and that the log is of this vehicle")
     SPEED_DIFFERS = "speed_differs", _NOTE, "drive all loads at the same speed, or every load at every speed"
 
     # The loads

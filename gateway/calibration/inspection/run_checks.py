@@ -62,10 +62,10 @@ MASKED: Final = (
 BELIEVED_AGREEMENT: Final = 0.92  # chosen: with this agreement the speed's unit is not tested
 UNIT_GAIN: Final = 0.04  # chosen: gain of agreement that proves a wrong unit of speed
 SPEED_MISREAD: Final = {  # how many times too high the speed then reads; a mile has 1.609344 km
-    "its numbers are km/h, but the signal map says m/s": 3.6,
-    "its numbers are m/s, but the signal map says km/h": 1.0 / 3.6,
-    "its numbers are km/h, but the signal map says mph": 1.609344,
-    "its numbers are mph, but the signal map says km/h": 1.0 / 1.609344,
+    "its numbers are km/h, read as m/s": 3.6,
+    "its numbers are m/s, read as km/h": 1.0 / 3.6,
+    "its numbers are km/h, read as mph": 1.609344,
+    "its numbers are mph, read as km/h": 1.0 / 1.609344,
 }
 SMOOTH_MPS2: Final = 0.08  # chosen: the quietest ordinary road shakes a vehicle more, in the estimators' band
 STEPS_SHARE_MAX: Final = 0.1  # chosen: of a signal's power in that band

@@ -15,8 +15,8 @@ from gateway.bus.frames import merge_frames
 from gateway.bus.signals import SHIPPED_PREFIX, Decoder, load_signal_map, shipped_map
 from gateway.bus.signals.bit_field import Coding
 from gateway.bus.signals.dbc import DatabaseMessage, Databases
-from gateway.bus.signals.decode import SAME_SPEED_SHARE, TELLING_SHARE
-from gateway.bus.signals.mapping import SOURCE_ADDRESS, id_name
+from gateway.bus.signals.decode import SAME_SPEED_SHARE, TELLING_SHARE, Remark
+from gateway.bus.signals.mapping import QUANTITIES, SOURCE_ADDRESS, id_name
 from gateway.bus.signals.signal_map import FEWEST_COUNTER_BITS, MOST_COUNTER_BITS, shipped_databases, shipped_maps
 from gateway.core.batch import GRAVITY_TOLERANCE_MPS2, RATE_MIN_SHARE
 from gateway.core.batch_settings import BatchSettings
@@ -36,8 +36,9 @@ FIX_3D: Final = 3  # usual code of a three-dimensional GNSS fix
 
 @dataclass(frozen=True, slots=True)
 class MapFit:
-    """A shipped map on one channel: the signals found and missing, the median of its vertical axis, and
-    which frames do not fit it. It fits if both inertial signals come, and gravity is on the mapped axis.
+    """A shipped map on one channel: the signals found and missing, the median of its vertical axis, which frames do
+    not fit it, and signals of which no frame counts. It fits if both inertial signals come, and gravity is on the
+    mapped axis.
     """
 
     name: str
@@ -46,6 +47,7 @@ class MapFit:
     missing: list[Signal]
     vertical_mps2: float | None
     causes: list[str]
+    silent: list[Remark]
 
     @property
     def has_gravity(self) -> bool:
@@ -71,7 +73,8 @@ def fits_of(heard: Sequence[Heard]) -> list[MapFit]:
             missing = [signal for signal in motion.signals if signal not in found and signal not in ASIDE]
             vertical = motion.of(Signal.VERTICAL_ACCELERATION)[1]
             vertical_mps2 = round(float(np.median(vertical)), 3) if len(vertical) else None
-            fits.append(MapFit(name, channel, found, missing, vertical_mps2, [each.text for each in decoder.causes()]))
+            causes, silent = decoder.causes(), [each for each in decoder.silent() if each.share]
+            fits.append(MapFit(name, channel, found, missing, vertical_mps2, [one.text for one in causes], silent))
     return sorted((fit for fit in fits if fit.found), key=lambda fit: (not fit.fits, len(fit.missing), fit.name))
 
 
@@ -164,24 +167,27 @@ class Look:
 
     def _lacking(self) -> Iterator[str]:
         """The obstacles to weighing with this log, and their remedies."""
-        lost = {signal for each in self._remarks if each.share >= TELLING_SHARE for signal in each.signals}
+        remarks = (*self._remarks, *(each for fit in self.whole for each in fit.silent))
+        lost = {signal for each in remarks if each.share >= TELLING_SHARE for signal in each.signals}
         roles = {each.role: each for each in self.found}
         up, pitch = roles.get(Signal.VERTICAL_ACCELERATION), roles.get(Signal.PITCH_RATE)
         has_speed = {Signal.SPEED, Signal.WHEEL_SPEED} & {*(self.whole[0].found if self.whole else roles)}
-        described = any(each.quantity == "acceleration" for each in self.readings)
-        no_database = (
-            f"no database describes one in {', '.join(TO_SI['acceleration'])}: give that of the sensor by --dbc"
-        )
-        no_gravity = "the sensor is not in this log, or takes gravity off" if described else no_database
+        described = {each.quantity for each in self.readings}
         for is_missing, signal, what, remedy in (
-            (not self.whole and up is None, Signal.VERTICAL_ACCELERATION, "acceleration reads 9.8 m/s2", no_gravity),
+            (not self.whole and up is None, Signal.VERTICAL_ACCELERATION, "acceleration reads 9.8 m/s2",
+             "the sensor is not in this log, or takes gravity off"),
             (not self.whole and up is not None and pitch is None, Signal.PITCH_RATE, "pitch rate could be told",
              "drive with some braking, or name it yourself"),
             (not has_speed, Signal.SPEED, "speed", "add [signals.speed] from a GNSS receiver or the vehicle"),
         ):  # fmt: skip
-            if is_missing:
-                told = "frames or values that would show it are refused, as told above" if signal in lost else remedy
-                yield f"no {what}: {told}"
+            quantity = QUANTITIES[signal]
+            if is_missing and signal in lost:
+                yield f"no {what}: frames or values that would show it are refused, as told above"
+            elif is_missing and quantity not in described and quantity != "speed":
+                units = ", ".join(TO_SI[quantity])
+                yield f"no {what}: no database describes one in {units}: give that of the sensor by --dbc"
+            elif is_missing:
+                yield f"no {what}: {remedy}"
         if not self.whole and (self.tilt_deg or 0.0) > MOST_TILT_DEG:
             yield f"the sensor leans by {self.tilt_deg:.0f} degrees: mount it level, or have it turn its axes"
         for each in (up, pitch):

@@ -71,7 +71,7 @@ class StatedVan:
             return None
         try:
             return self.named.stated(stated.figures)
-        except (CampaignError, NoSisterError):  # the settings were changed since
+        except (CampaignError, NoSisterError):  # see fault
             return None
 
     @property
@@ -81,14 +81,22 @@ class StatedVan:
 
     @property
     def fault(self) -> str | None:
-        """What is wrong if the box was moved: it would weigh this vehicle by another one's springs."""
+        """What is wrong if the box was moved, so that it would weigh this vehicle by another one's springs, or if the
+        settings name another sister since.
+        """
         stated = self._book.record.vehicle
-        if stated is None or stated.vehicle_id in (None, self.given.id):
+        if stated is None:
             return None
-        return (
-            f"what was learnt is of {stated.vehicle_id}, and [vehicle] id is {self.given.id}: give another vehicle "
-            "another [store] directory; if only the id has changed, state the vehicle again"
-        )
+        if stated.vehicle_id not in (None, self.given.id):
+            return (
+                f"what was learnt is of {stated.vehicle_id}, and [vehicle] id is {self.given.id}: give another vehicle "
+                "another [store] directory; if only the id has changed, state the vehicle again"
+            )
+        try:
+            self.named.stated(stated.figures)
+        except (CampaignError, NoSisterError) as fault:
+            return f"nothing is learnt: {fault}"
+        return None
 
     def _doubts(self, stated: Stated) -> list[Doubt]:
         return list(doubts_of(stated.figures, self.named.sister))

@@ -1,10 +1,12 @@
-"""Layers around the application: security headers, the date, and HEAD as GET."""
+"""Layers around the application: security headers, the date, HEAD as GET, and the length of a body."""
 
 import asyncio
 from collections import Counter
 from email.utils import formatdate
 from typing import Final
 
+from starlette.datastructures import Headers
+from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 
@@ -86,3 +88,25 @@ class HeadAsGet:
             return {"type": "http.disconnect"}
 
         await self._app({**scope, "method": "GET"}, gone, send_head)
+
+
+class BodyLimit:
+    """ASGI middleware: whoever reads a body of more than ``most_bytes`` meets an HTTPException 413."""
+
+    def __init__(self, app: ASGIApp, most_bytes: int) -> None:
+        self._app = app
+        self._most_bytes = most_bytes
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        n_bytes, length = 0, Headers(scope=scope).get("content-length", "0") if scope["type"] == "http" else "0"
+
+        async def limited() -> Message:
+            nonlocal n_bytes
+            if int(length) <= self._most_bytes:
+                message = await receive()
+                n_bytes += len(message.get("body", b""))
+                if n_bytes <= self._most_bytes:
+                    return message
+            raise HTTPException(413, f"the body has more than {self._most_bytes:,} bytes")
+
+        await self._app(scope, limited, send)

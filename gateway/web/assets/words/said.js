@@ -177,5 +177,5 @@ export const LEFT_OUT = [
   ["check the antenna, and valid_when in the signal map; also map wheel_speed", "die Antenne und valid_when in der Zuordnung prüfen; auch wheel_speed zuordnen"],
   ["restart the receiver; check its antenna, and valid_when in the signal map", "den Empfänger neu starten; seine Antenne und valid_when in der Zuordnung prüfen"],
   ["drive on an open road; check the unit of speed in the signal map", "auf freier Straße fahren; unit von speed in der Zuordnung prüfen"],
-  ["check the unit of speed in the signal map, and wheelbase_m", "unit von speed in der Zuordnung und den Radstand prüfen"],
+  ["check the unit of speed in the signal map, wheelbase_m, and that the log is of this vehicle", "unit von speed in der Zuordnung und den Radstand prüfen, und ob die Aufzeichnung von diesem Fahrzeug ist"],
 ];
