@@ -17,7 +17,13 @@ codecs.register_error(OR_CP1252, _as_cp1252)
 
 
 def text_of(content: bytes) -> str:
-    """The text of a file; a byte order mark is skipped, and tells UTF-16. Line ends become ``\\n``."""
-    is_utf_16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    text = content.decode("utf-16", "replace") if is_utf_16 else content.decode("utf-8-sig", OR_CP1252)
+    """The text of a file; a byte order mark is skipped. It tells UTF-16, as does half of a first character. Line ends
+    become ``\\n``.
+    """
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        text = content.decode("utf-16", "replace")
+    elif 0 in content[:2]:
+        text = content.decode("utf-16-le" if content[0] else "utf-16-be", "replace")
+    else:
+        text = content.decode("utf-8-sig", OR_CP1252)
     return text.replace("\r\n", "\n").replace("\r", "\n")

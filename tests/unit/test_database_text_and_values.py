@@ -52,6 +52,8 @@ TEXTS = {
     "cp1252": DBC.encode("cp1252"),
     "cp1252 and UTF-8 in one file": DBC.encode() + 'CM_ "°";\n'.encode("cp1252"),
     "UTF-16": DBC.encode("utf-16"),
+    "UTF-16 without a mark": DBC.encode("utf-16-be"),
+    "UTF-16 of Windows without a mark": DBC.encode("utf-16-le"),
     "CRLF": DBC.replace("\n", "\r\n").encode(),
 }
 

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from gateway.bus.frames import LAST_SECOND, gathered
-from gateway.bus.logs.wall_clock import is_doubled, ns_since_1970
+from gateway.bus.logs.wall_clock import is_ambiguous, ns_since_1970
 from gateway.bus.signals import Decoder
 from gateway.bus.signals.decode import TELLING_SHARE, Remark
 from gateway.bus.signals.mapping import IdFilter
@@ -150,7 +150,7 @@ class LogReport:
         if date is None or start_ns is None or not FIRST_DATED_NS <= start_ns <= LAST_SECOND * NS_PER_S:
             self._note(f"its date {told[:SHOWN_CHARS]!r} {'cannot be read' if date is None else 'cannot be right'}")
             return self.start_ns or 0
-        if is_doubled(date, zone):
+        if is_ambiguous(date, zone):
             self._note(f"its date {told[:SHOWN_CHARS]!r} is in an hour in which clocks are set: it may be an hour off")
         self.has_wall_clock, self.zone = date.tzinfo is None, zone
         self.start_ns = max(start_ns, self.start_ns or 0)
@@ -259,10 +259,10 @@ class LogReport:
 
     def remarks_on_dates(self) -> Iterator[str]:
         """What is not known of the dates of its frames."""
-        if self.first_ns is None:
+        if self.first_ns is None or self.is_partly_dated:
             return
         if not self.is_dated:
-            yield from [] if self.is_partly_dated else ["has no date: times count from the zero of its stamps"]
+            yield "has no date: times count from the zero of its stamps"
         elif self.has_wall_clock and self.zone is None:
             yield "its date states no zone, it is read as UTC; if that is wrong, state time_zone in the signal map"
 

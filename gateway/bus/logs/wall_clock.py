@@ -86,7 +86,7 @@ def ns_since_1970(date: datetime, zone: tzinfo | None) -> int:
     return (aware - datetime(1970, 1, 1, tzinfo=UTC)) // timedelta(microseconds=1) * 1000
 
 
-def is_doubled(date: datetime, zone: tzinfo | None) -> bool:
+def is_ambiguous(date: datetime, zone: tzinfo | None) -> bool:
     """Whether clocks of the zone showed this time twice, or not at all, because they were set that day."""
     first, second = (date.replace(tzinfo=date.tzinfo or zone or UTC, fold=fold) for fold in (0, 1))
     return first.utcoffset() != second.utcoffset()

@@ -173,7 +173,7 @@ class _MessageReader:
             each = [f"{address:#04x} ({n_of_source[address]:,.0f})" for address in addresses[:NAMED_SOURCES]]
             text = (
                 f"{self.mapped.name}: {len(addresses)} devices send {', '.join(mixed)}, with the source addresses "
-                f"{', '.join(each)}: state the source_address of one in the signal map"
+                f"{', '.join(each)}: state the source_address of one in the signal map, unless one has changed its own"
             )
             yield Remark(text, float(1.0 - n_of_source.max() / n_of_source.sum()), frozenset(mixed))
         for one in self.readers:

@@ -33,12 +33,12 @@ INERTIAL: Final = (Signal.VERTICAL_ACCELERATION, Signal.PITCH_RATE)
 UNIT_TOLERANCE: Final = 0.15  # chosen: relative, of gravity in a wrong unit
 STEADY_SHARE: Final = 0.2  # chosen: scatter over mean below which the mean is gravity
 MISREAD_AS_MPS2: Final = {  # what gravity then reads, over 9.81
-    "its numbers are g, but the signal map says m/s2": 1.0 / STANDARD_GRAVITY_MPS2,
-    "its numbers are m/s2, but the signal map says g": STANDARD_GRAVITY_MPS2,
-    "its numbers are mg, but the signal map says m/s2": 1000.0 / STANDARD_GRAVITY_MPS2,
-    "its numbers are mg, but the signal map says g": 1000.0,
-    "its numbers are m/s2, but the signal map says mg": STANDARD_GRAVITY_MPS2 / 1000.0,
-    "its numbers are g, but the signal map says mg": 1.0 / 1000.0,
+    "its numbers are g, read as m/s2": 1.0 / STANDARD_GRAVITY_MPS2,
+    "its numbers are m/s2, read as g": STANDARD_GRAVITY_MPS2,
+    "its numbers are mg, read as m/s2": 1000.0 / STANDARD_GRAVITY_MPS2,
+    "its numbers are mg, read as g": 1000.0,
+    "its numbers are m/s2, read as mg": STANDARD_GRAVITY_MPS2 / 1000.0,
+    "its numbers are g, read as mg": 1.0 / 1000.0,
 }
 
 # Of the rows and the batches.
