@@ -198,7 +198,8 @@ def test_a_drive_without_a_date_has_none_anywhere(drives: Path, tmp_path: Path) 
     log.write_bytes(_undated((drives / log.name).read_bytes()))
     options = ("--vehicle", drives / "van.toml", "--signals", SIGNALS, "--output", output, *WINDOW)
     assert "  no date  " in printed("learn", log, *options)
-    assert load_calibration(output).provenance.drives[0].t_start is None
+    (drive,) = load_calibration(output).provenance.drives
+    assert (drive.log, drive.t_start) == ("no date, 0 s", None)
     (told,) = json.loads(printed("learn", log, *options, "--json"))["drives"]
     assert (told["t_start"], told["t_start_ns"]) == (None, 0)
 

@@ -206,6 +206,4 @@ def _run(number: int, one: Driven, statement: Statement, vehicle: Vehicle) -> St
         share_pct = statement.front_share_pct
     elif isfinite(payload_kg) and statement.has_place:
         share_pct = front_share_pct(vehicle, payload_kg, statement.position_m)
-    return StatedDrive(
-        drive_name(number), one.batches, statement, payload_kg, share_pct, number, one.source or one.name
-    )
+    return StatedDrive(drive_name(number), one.batches, statement, payload_kg, share_pct, number, one.name)

@@ -12,7 +12,8 @@ from gateway.calibration.learning.spans import ENOUGH_S, can_teach, spans_of, te
 from gateway.core.batch_settings import BatchSettings
 from gateway.core.pool import LEAST_LOAD_S, Part, spanned
 from gateway.estimates.batch_estimate import Way
-from gateway.records import Batch, Why, iso_utc
+from gateway.records import Batch, Why, date_of
+from gateway.units import NS_PER_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +31,8 @@ class Driven:
     @property
     def name(self) -> str:
         """Its begin, which is its name in files."""
-        return f"{iso_utc(self.piece.begin_ns)[:19]}Z"
+        date = date_of(self.piece.begin_ns)
+        return f"{date[:19]}Z" if date else f"no date, {self.piece.begin_ns / NS_PER_S:.0f} s"
 
     @property
     def usable_s(self) -> float:
