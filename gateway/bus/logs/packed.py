@@ -62,9 +62,9 @@ _LONGEST_MAGIC: Final = max(len(magic) for packing in PACKINGS for magic in pack
 
 
 class InflatedStream(io.RawIOBase):
-    """A packed file inflated, all its members. Unlike a GzipFile it gives all data before a damage, then raises.
+    """A packed file inflated, all its members. Unlike a GzipFile it gives the data before a damage, then raises.
 
-    Raises EOFError if the stream is cut, OSError if it is damaged.
+    Raises EOFError if the stream is cut, and nothing is lost; OSError if it is damaged, for the piece that holds it.
     """
 
     def __init__(self, file: BinaryIO, packing: Packing) -> None:
@@ -89,7 +89,7 @@ class InflatedStream(io.RawIOBase):
             try:
                 text = self._inflater.decompress(self._packed, min(len(room), INFLATED_BYTES))
             except self._packing.fault as fault:
-                raise OSError(f"the {self._packing.name} stream is damaged: {fault}") from None
+                raise OSError(f"the {self._packing.name} stream is damaged: {fault}: its last piece is lost") from None
             self._packed = b""
             if text:
                 room[: len(text)] = text
