@@ -236,7 +236,7 @@ def _asked(record: Record) -> Iterator[str]:
         named = f"drive{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))}"
         looks = "looks" if len(numbers) == 1 else "look"
         dated = [one for one in drives if one["t_start"]]
-        asked = "Is that right? Then add to the statements:" if dated else "A statement wants a log with dates."
+        asked = "Is that right? Then add to the statements:" if dated else "A statement needs a log with dates."
         yield f"{named} of unknown load {looks} empty. {asked}"
         yield from ["    from;until;source"] * bool(dated)
         yield from (f"    {one['t_start'][:19]}Z;{one['t_end'][:19]}Z;empty" for one in dated)

@@ -84,7 +84,7 @@ def _verdict(seen: Look, written: list[str]) -> Iterator[str]:
         yield "This cannot work yet:" if seen.lacking else once
         yield from (f"  {what}" for what in (*seen.to_mend, *seen.lacking))
     else:
-        steps = ", but not across the steps of its stamps that are told above" if seen.report.has_several_zeros else ""
+        steps = ", but not across the steps in its stamps (see above)" if seen.report.has_several_zeros else ""
         yield f"This can work{steps}."
     if not seen.lacking:
         is_shipped = len(seen.whole) == 1

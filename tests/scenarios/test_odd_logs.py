@@ -343,7 +343,7 @@ def test_record(case: Case, folder: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 ASKED = "was the clock set?"
-SET = {  # the first stamp, by how much the clock is set midway, what is told, and of look and the archive
+SET = {  # first stamp, seconds by which the clock is set midway, remark, whether in order, whether archived
     "back": (ABSOLUTE_S[0], -40.0, ("its stamps step back 1 time, by up to 0:00:40", ASKED), False, True),
     "forward": (ABSOLUTE_S[0], 86_400.0, ("its stamps leap forward by 1 day, 0:00:00", ASKED), True, True),
     "from 1970": (
@@ -358,7 +358,7 @@ SET = {  # the first stamp, by how much the clock is set midway, what is told, a
 
 @pytest.mark.parametrize("how", SET)
 def test_a_clock_that_was_set_while_recording(how: str, folder: Path) -> None:
-    """It is told, no batch gets a date of 1970 in the archive, and the years between the stamps cost no memory."""
+    """The commands say so, the archive gets no batch of 1970, and the years between the stamps cost no memory."""
     first_s, set_by_s, told, is_in_order, is_archived = SET[how]
     stamps_s = first_s + RELATIVE_S
     stamps_s[N // 2 :] += set_by_s

@@ -235,7 +235,7 @@ def test_an_impossible_date_of_a_block_leaves_that_of_the_header(tmp_path):
 @pytest.mark.parametrize("stamps", ["absolute", "relative"])
 @pytest.mark.parametrize("days", [(10, 11), (11, 10)])
 def test_each_of_several_headers_dates_the_frames_behind_it(days, stamps, tmp_path):
-    """Relative stamps went on from the log before, and the first frame was told to be late."""
+    """The sum of relative stamps begins anew at each header, so that no frame seems late."""
     logs = (asc(f"2023-03-{day} 15:06:12", ASC_FRAME, base=f"base hex  timestamps {stamps}\n") for day in days)
     frames, report = read(tmp_path / "a.asc", "".join(logs))
     assert frames.t_ns.tolist() == [round(NOON.replace(day=day).timestamp() * 1e9) + 500_000_000 for day in days]

@@ -37,8 +37,8 @@ FIX_3D: Final = 3  # usual code of a three-dimensional GNSS fix
 @dataclass(frozen=True, slots=True)
 class MapFit:
     """A shipped map on one channel: the signals found and missing, the median of its vertical axis, which frames do
-    not fit it, and signals of which no frame counts. It fits if both inertial signals come, and gravity is on the
-    mapped axis.
+    not fit it, and the needed signals whose frames are all left out. It fits if both inertial signals come, and gravity
+    is on the mapped axis.
     """
 
     name: str
